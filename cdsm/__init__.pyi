@@ -71,9 +71,9 @@ from cdsm.statics.forward_statics import forward_statics as forward_statics
 from cdsm.statics.load_cycle import load_cycle as load_cycle
 from cdsm.statics.modes import modes as modes
 from cdsm.statics.weight_test import weight_test as weight_test
+from cdsm.status import Status as Status
 from cdsm.stiffness_matrix import Stiffness as Stiffness
 from cdsm.stiffness_matrix import stiffness as stiffness
-from cdsm.support.status import Status as Status
 from cdsm.sweeps.poses import GridPoses as GridPoses
 from cdsm.sweeps.poses import PathPoses as PathPoses
 from cdsm.sweeps.poses import RandomPoses as RandomPoses

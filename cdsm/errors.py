@@ -13,6 +13,8 @@ import sys
 import warnings
 from typing import TYPE_CHECKING
 
+from cdsm.status import Status
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -34,14 +36,14 @@ def listed(texts: Texts, most: int = 4, between: str = ", ") -> str:
 class CdsmError(Exception):
     """Base class of all errors raised by cdsm.
 
-    ``status`` names the entry of :class:`~cdsm.Status` that a batch has in its place, if any.
+    ``status`` is the member of :class:`~cdsm.Status` for its cause, which a batch has in its place.
     """
 
-    status: str = ""
+    status: Status = Status.FAILED
 
-    def __init__(self, message: str = "", status: str = "") -> None:
+    def __init__(self, message: str = "", status: Status | None = None) -> None:
         super().__init__(message)
-        if status:
+        if status is not None:
             self.status = status
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -51,7 +53,7 @@ class CdsmError(Exception):
 
 def solver_failed(solver: str, problem: str) -> CdsmError:
     """Return the error for a ``solver`` whose result is not the optimum."""
-    return CdsmError(f"solver {solver!r} {problem}", "SOLVER_FAILED")
+    return CdsmError(f"solver {solver!r} {problem}", Status.SOLVER_FAILED)
 
 
 class CdsmWarning(UserWarning):
@@ -61,7 +63,9 @@ class CdsmWarning(UserWarning):
 class InvalidInput(CdsmError, ValueError):
     """An argument, a cable or a thing called ``name`` with a wrong type, shape or value."""
 
-    def __init__(self, name: str, problem: str, status: str = "") -> None:
+    status = Status.INVALID_INPUT
+
+    def __init__(self, name: str, problem: str, status: Status | None = None) -> None:
         super().__init__(f"{name}: {problem}", status)
         self.name = name
 
@@ -99,6 +103,8 @@ class GeometryError(CdsmError, ValueError):
     ``source`` is the file of the geometry, or None.
     """
 
+    status = Status.INVALID_INPUT
+
     def __init__(self, faults: Texts | str, source: str | None = None) -> None:
         self.faults = (faults,) if isinstance(faults, str) else tuple(faults)
         self.source = source
@@ -114,7 +120,7 @@ class ElasticityRangeError(CdsmError, ValueError):
     ``indices`` those of the invalid entries of the input; ``cables`` the names, as far as known.
     """
 
-    status = "OUTSIDE_ELASTICITY"
+    status = Status.OUTSIDE_ELASTICITY
 
     def __init__(
         self, problem: str, tension: Numbers = (), indices: Sequence[int] = (), cables: Texts = ()
@@ -140,7 +146,7 @@ class InfeasibleTension(CdsmError):
     ``hint`` becomes part of the message.
     """
 
-    status = "INFEASIBLE"
+    status = Status.INFEASIBLE
 
     def __init__(
         self,
@@ -181,7 +187,7 @@ class SingularStiffness(CdsmError, ArithmeticError):
     or the direction (3,) in base axes in which the tip cannot move; of unit length.
     """
 
-    status = "SINGULAR"
+    status = Status.SINGULAR
 
     def __init__(self, problem: str, direction: NDArray[np.float64]) -> None:
         super().__init__(problem)
@@ -195,6 +201,8 @@ class EquilibriumError(CdsmError, ArithmeticError):
     largest fraction of the load in equilibrium, ``joint`` the one with the largest residual or that
     buckles first.
     """
+
+    status = Status.NO_EQUILIBRIUM
 
     def __init__(
         self,
@@ -218,6 +226,8 @@ class UnreachableStiffness(CdsmError):
     target, or the values that were found below and above it. ``hint``, which may say how to widen
     the range, becomes part of the message.
     """
+
+    status = Status.UNREACHABLE_STIFFNESS
 
     def __init__(
         self,

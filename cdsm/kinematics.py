@@ -22,10 +22,10 @@ from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.rigid_body import rotation_vector
+from cdsm.status import Status
 from cdsm.support.format import aligned, beyond, place
 from cdsm.support.nearest import at_limits, nearest, range_of
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.status import Status
 from cdsm.support.validation import instance, number_array, scalar, vector
 from cdsm.support.values import Array, frozen
 
@@ -200,7 +200,7 @@ def _solve(
     try:
         pose = arm.at(search(lower, upper))
     except InvalidInput as error:
-        if error.status != Status.COINCIDENT_SITES.name:
+        if error.status != Status.COINCIDENT_SITES:
             raise
         # disks touch at a limit, so a cable has no direction there
         margin = _TOUCHING * range_of(lower, upper)

@@ -27,9 +27,9 @@ from cdsm.posture import Posture
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import SHORTEST_SEGMENT, Routing
 from cdsm.segments import Chains
+from cdsm.status import Status
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, beyond, plural
-from cdsm.support.status import Status
 from cdsm.support.validation import (
     LONGEST,
     Direction,
@@ -291,7 +291,7 @@ class Manipulator(Printed):
             angles, low, high = (of[at].tolist() for of in (q, self.lower, self.upper))
             texts = list(map(beyond, names, angles, low, high, units))
             said = f"{listed(texts, 4, '; ')}. {_STAY}{UNCHECKED}."
-            raise InvalidInput("q", said, Status.BEYOND_LIMITS.name)
+            raise InvalidInput("q", said, Status.BEYOND_LIMITS)
         return q
 
     @cached_property
@@ -310,7 +310,7 @@ class Manipulator(Printed):
             cable = self.cables[int(self.routing.cable[length.argmin()])]
             said = f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
             said += "direction there. Move a site, or change the posture."
-            raise InvalidInput(f"cable {cable.name!r}", said, Status.COINCIDENT_SITES.name)
+            raise InvalidInput(f"cable {cable.name!r}", said, Status.COINCIDENT_SITES)
 
     @property
     def geometry(self) -> Geometry:

@@ -59,7 +59,7 @@ ERRORS = (
     cdsm.InvalidInput("q", "is odd."),
     cdsm.FileError("/nowhere/arm.toml", "does not exist."),
     cdsm.GeometryError(["a: is missing", "b: is odd"], "arm.toml"),
-    cdsm.InvalidInput("q", "joint1 is at 2 rad", "BEYOND_LIMITS"),
+    cdsm.InvalidInput("q", "joint1 is at 2 rad", cdsm.Status.BEYOND_LIMITS),
     cdsm.ElasticityRangeError("outside.", [900.0], [3], ["cable1_1"]),
     cdsm.InfeasibleTension(np.array([0.1, -0.2]), "joint2", 3.5, ["cable1_1"]),
     cdsm.SingularStiffness("K_θ is singular.", np.array([0.6, 0.8])),

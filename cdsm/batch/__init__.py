@@ -2,6 +2,6 @@
 
 from cdsm.batch.distribution import Tensions, distribute_tensions
 from cdsm.batch.evaluation import Batch, evaluate
-from cdsm.support.status import Status
+from cdsm.status import Status
 
 __all__ = ["Batch", "Status", "Tensions", "distribute_tensions", "evaluate"]

@@ -20,7 +20,7 @@ from cdsm.batch.rows import Body, Indices, Pose, one_by_one, rows_of, side_by_si
 from cdsm.errors import CdsmError
 from cdsm.manipulator import LIMIT_SLACK
 from cdsm.routing import SHORTEST_SEGMENT
-from cdsm.support.status import Status
+from cdsm.status import Status
 from cdsm.support.values import Array, frozen
 from cdsm.tension.infeasibility import is_infeasible, is_proved_infeasible
 from cdsm.tension.solvers import DEFAULT_SOLVER, Problem, nondimensional, solve

@@ -21,8 +21,9 @@ from cdsm.batch.quantities import DIMENSIONS, OF_POSTURE, Codes, OfPostures
 from cdsm.batch.solution import Rows
 from cdsm.errors import InvalidInput, unknown
 from cdsm.manipulator import ANOTHER_ARM, Manipulator
+from cdsm.status import Status
 from cdsm.support.format import coordinates
-from cdsm.support.status import Status, summary
+from cdsm.support.status import summary
 from cdsm.support.validation import Direction, flag, instance, one_of, unit_directions
 from cdsm.support.values import Array, Named, frozen
 from cdsm.tension import checked_bounds

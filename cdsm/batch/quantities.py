@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from cdsm import readings
 from cdsm.manipulator import Manipulator
+from cdsm.status import ENTRY_STATUSES, Status
 from cdsm.support.format import JointUnits
 from cdsm.support.result import Result
-from cdsm.support.status import Status, summary
+from cdsm.support.status import summary
 from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
@@ -99,15 +100,15 @@ class OfPostures(Result):
         """Return all quantities as a labelled Dataset in SI; needs xarray (CdsmError)."""
         found = super().to_xarray()
         found["status"].attrs = {
-            "flag_values": np.array([int(each) for each in Status], dtype=np.uint8),
-            "flag_meanings": " ".join(each.name.lower() for each in Status),
+            "flag_values": np.array([int(status) for status in ENTRY_STATUSES], dtype=np.uint8),
+            "flag_meanings": " ".join(status.word for status in ENTRY_STATUSES),
         }
         return found
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with a row for each posture; needs pandas (CdsmError)."""
         table = super().to_pandas()
-        table["status"] = [Status(each).name.lower() for each in self.status]
+        table["status"] = [Status(code).word for code in self.status]
         return table
 
     def __len__(self) -> int:

@@ -33,9 +33,6 @@ UNMET is the exit code of every answer with a warning, such as that of an unstab
 errors that say what the arm cannot do.
 """
 
-_CANNOT: Final = (
-    *("InfeasibleDesign", "InfeasibleTension", "EquilibriumError", "UnreachableStiffness"),
-)
 _OF_PYTHON: Final = re.compile(r", or, in Python, .*?(?=\.(\s|$))")  # no remedy of a command
 
 
@@ -149,7 +146,8 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
                 print_json({"error": kind, "message": message, "data": vars(error)})
             else:
                 typer.secho(f"error: {message}", fg="red", err=True)
-            code = UNMET if kind in _CANNOT else FAILED
+            unmet = isinstance(error, cdsm.CdsmError) and error.status.is_unmet
+            code = UNMET if unmet else FAILED
         raise typer.Exit(code)
 
     return command

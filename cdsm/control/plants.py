@@ -15,12 +15,13 @@ import numpy as np
 
 from cdsm.control.laws import Command
 from cdsm.control.sensing import Measurement
-from cdsm.errors import ElasticityRangeError, InvalidInput, need, solver_failed
+from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput, need
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics import quasi_static
 from cdsm.statics.equilibrium import equilibrium
 from cdsm.statics.quasi_static import Load, QuasiStaticArm
+from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.validation import instance, quantity, scalar, whole_number
 from cdsm.support.values import Array, frozen
@@ -237,7 +238,9 @@ class MuJoCoPlant:
             mujoco.mj_applyFT(model, data, wrench[:3], wrench[3:], tip, body, data.qfrc_applied)
             mujoco.mj_step(model, data, steps)
         if not np.isfinite(data.qpos).all() or data.warning.number.any():
-            raise solver_failed("mujoco", "diverges: the arm moves beyond all bounds")
+            raise CdsmError(
+                "the simulation diverges: the arm moves beyond all bounds", Status.DIVERGED
+            )
         own = [model.joint(name).qposadr[0] for name in self.arm.joint_names]
         pose = self.arm.at(data.qpos[own], check_limits=False)
         F = _tensions_of(self.arm, pose.cable_lengths, command.paid_out, command.tension)

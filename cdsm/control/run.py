@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, Literal, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from cdsm.errors import listed
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path_plan import PathPlan
+from cdsm.status import Status
 from cdsm.support.format import aligned, plural
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.values import Array, Plotted, frozen
@@ -22,13 +23,6 @@ if TYPE_CHECKING:
 
     from cdsm.control.plants import Plant, PlantState
 
-Outcome = Literal["completed", "diverged", "no_equilibrium", "elasticity_range"]
-
-_ENDS: Final = {
-    "diverged": "UNSTABLE",
-    "no_equilibrium": "BUCKLES",
-    "elasticity_range": "OUTSIDE THE LAW",
-}
 _ROUNDING = 1e-9  # distance beyond a band [m] that counts as rounding
 
 
@@ -79,9 +73,9 @@ class TrackingRun(Result, Plotted):
             give the target (n,).
         replan_failed: For each step at which the outer loop could not plan tensions and kept the
             previous ones: the number of the step, and the reason.
-        outcome: ``"completed"``; ``"diverged"``: the loop is unstable, so the tip left its path or
-            the plant diverged; ``"no_equilibrium"``: the arm buckled; ``"elasticity_range"``: a
-            tension left the domain of its law.
+        outcome: OK (the path is followed to its end); DIVERGED (the loop is unstable: the tip left
+            its path, or the plant diverged); NO_EQUILIBRIUM (the arm buckled); OUTSIDE_ELASTICITY
+            (a tension left the domain of its law).
         reason: What stopped the loop, in words; or empty.
         states: State of the plant after each step.
     """
@@ -116,7 +110,7 @@ class TrackingRun(Result, Plotted):
     target_unreachable: NDArray[np.bool_] = field(metadata=unit("1", "time"))
     change_limited: NDArray[np.bool_] = field(metadata=unit("1", "time"))
     replan_failed: dict[int, str] = field(metadata=unit("1"))
-    outcome: Outcome = field(metadata=unit("1"))
+    outcome: Status = field(metadata=unit("1"))
     reason: str = field(metadata=unit("1"))
     states: tuple[PlantState, ...]
 
@@ -161,9 +155,9 @@ class TrackingRun(Result, Plotted):
     def warnings(self) -> tuple[str, ...]:
         """Faults of the run, worst first; empty if there are none."""
         said = []
-        if self.outcome != "completed":
+        if self.outcome is not Status.OK:
             end = self.time.max(initial=0.0)
-            said.append(f"{_ENDS[self.outcome]} at {end:.4g} s: {self.reason}")
+            said.append(f"{self.outcome.title} at {end:.4g} s: {self.reason}")
         if unstable := np.flatnonzero(~(self.margin > 0.0)).tolist():
             said.append(f"UNSTABLE {self._at(unstable)}: without friction the arm would buckle")
         if failed := sorted(self.replan_failed):
@@ -192,7 +186,7 @@ class TrackingRun(Result, Plotted):
         return super().to_pandas().rename(columns=lambda name: name.removeprefix("angles "))
 
     def __repr__(self) -> str:
-        return f"<TrackingRun of {self.arm.name}, law {self.law}, {self.outcome}>"
+        return f"<TrackingRun of {self.arm.name}, law {self.law}, {self.outcome.word}>"
 
     def __str__(self) -> str:
         tip = 1e3 * self.tip_error
@@ -217,7 +211,8 @@ class TrackingRun(Result, Plotted):
                 f"{100.0 * inside.mean():.4g} % of {bands}" if inside.size else "no step has one",
             ),
         ]
-        head = f"law {self.law}: {plural(len(self.time), 'step')}, {self.outcome}"
+        end = "completed" if self.outcome is Status.OK else self.outcome.message
+        head = f"law {self.law}: {plural(len(self.time), 'step')}, {end}"
         return "\n".join([*self.warnings, head, *aligned(rows)])
 
 

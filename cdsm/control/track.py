@@ -26,14 +26,15 @@ from cdsm.control.plants import (
     QuasiStaticPlant,
     frictionless_stiffness,
 )
-from cdsm.control.run import Outcome, TrackingRun
+from cdsm.control.run import TrackingRun
 from cdsm.control.sensing import Observer, Sensors
-from cdsm.errors import CdsmError, ElasticityRangeError, EquilibriumError, InvalidInput, listed
+from cdsm.errors import CdsmError, InvalidInput, listed
 from cdsm.friction.stick import half_width
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path import checked_change
 from cdsm.planning.path_plan import PathPlan
 from cdsm.posture import Posture
+from cdsm.status import Status
 from cdsm.support.progress import show_progress
 from cdsm.support.validation import instance, one_of, quantity, whole_number
 from cdsm.support.values import Array, frozen
@@ -42,10 +43,6 @@ from cdsm.tension import checked_bounds
 _MOST_STEPS: Final = 1000  # largest number of steps of control between two samples
 
 _DIVERGED: Final = 0.1  # tip error over the length of the arm of a loop that is unstable
-_OUTCOMES: Final[dict[type | None, Outcome]] = {
-    EquilibriumError: "no_equilibrium",
-    ElasticityRangeError: "elasticity_range",
-}
 
 
 def track(
@@ -152,7 +149,7 @@ def _follow(
     outer: StiffnessLoop | None,
     bounds: tuple[Array, Array],
     rows: list[dict[str, Any]],
-) -> tuple[Outcome, str]:
+) -> tuple[Status, str]:
     """Control step by step, with a row per step added to ``rows``; return how it ends, and why."""
     last = schedule[0].reference
     load = plan.stiffness[0].wrench
@@ -178,7 +175,7 @@ def _follow(
         try:
             state = plant.step_to(state, command, wanted.wrench)
         except CdsmError as fault:
-            return _OUTCOMES.get(type(fault), "diverged"), str(fault)
+            return fault.status, str(fault)
         true_values.append(state.true_values)
         last = reference
         paid_out = command.paid_out
@@ -207,8 +204,8 @@ def _follow(
         )
         off = float(np.linalg.norm(tip - wanted.tip))
         if off > _DIVERGED * plan.arm.length:
-            return "diverged", f"the tip is {1e3 * off:.3g} mm off its path"
-    return "completed", ""
+            return Status.DIVERGED, f"the tip is {1e3 * off:.3g} mm off its path"
+    return Status.OK, ""
 
 
 class _Wanted(NamedTuple):

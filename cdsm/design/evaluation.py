@@ -18,6 +18,7 @@ from cdsm.design.problem import MISSED, DesignProblem
 from cdsm.design.quantities import Found, measure, quiet_arm
 from cdsm.errors import CdsmError, unknown
 from cdsm.manipulator import UNCHECKED
+from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import plural
 from cdsm.support.progress import progress_bar
@@ -188,6 +189,8 @@ class InfeasibleDesign(CdsmError):
     ``design`` has the smallest sum of violations, one number for each variable (none if no arm was
     valid); ``constraints`` names what it violates, ``held``: it is not balanced, or unstable.
     """
+
+    status = Status.INFEASIBLE_DESIGN
 
     def __init__(self, message: str, constraints: Sequence[str], design: Sequence[float]) -> None:
         super().__init__(message)

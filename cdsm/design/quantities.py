@@ -15,7 +15,7 @@ from cdsm.design.problem import DesignProblem
 from cdsm.errors import CdsmError, CdsmWarning, GeometryError
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.support.status import Status
+from cdsm.status import Status
 from cdsm.support.values import Array
 from cdsm.sweeps.cases import QUANTITIES, Cases
 from cdsm.tension import grip

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import CdsmError, InvalidInput, solver_failed
 from cdsm.posture import Posture
+from cdsm.status import Status
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, instance, wrench_vector
@@ -130,7 +131,7 @@ def force_polytope(
         distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
         raise CdsmError(
             "solver 'highs' finds no force, though tensions balance none. Change a bound.",
-            "SOLVER_FAILED",
+            Status.SOLVER_FAILED,
         )
     return found
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import CdsmError, InvalidInput, UnreachableStiffness
+from cdsm.errors import CdsmError, InvalidInput
 from cdsm.kinematics import inverse_kinematics
 from cdsm.manipulator import UNCHECKED, Manipulator
 from cdsm.planning.goal import Goal
-from cdsm.planning.path_plan import InfeasibleSample, PathPlan, Status
+from cdsm.planning.path_plan import InfeasibleSample, PathPlan
 from cdsm.planning.plan import achieved, checked_targets, per_sample
 from cdsm.planning.tension_space import TensionSpace
+from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import coordinates, plural
 from cdsm.support.progress import show_progress
@@ -29,15 +29,6 @@ from cdsm.support.validation import (
 )
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
-
-_STATUS: Final[dict[str, Status]] = {
-    "BEYOND_LIMITS": "posture",
-    "COINCIDENT_SITES": "posture",
-    "INFEASIBLE": "balance",
-    "SOLVER_FAILED": "balance",
-    "OUTSIDE_ELASTICITY": "elasticity",
-    "SINGULAR": "singular",
-}
 
 
 def plan_path(
@@ -62,8 +53,8 @@ def plan_path(
 
     Between two planned samples that are k samples apart, no tension changes by more than k times
     ``max_change_per_sample``. If no tensions within this limit hit the target although others do,
-    the sample has the status ``"rate"``: after a jump of the target, until the limit allows the new
-    tensions. If the arm must follow meanwhile, give a ramp instead.
+    the sample has the status CHANGE_LIMITED: after a jump of the target, until the limit allows the
+    new tensions. If the arm must follow meanwhile, give a ramp instead.
 
     Args:
         arm: The arm.
@@ -111,12 +102,10 @@ def plan_path(
         except _Infeasible as fault:
             infeasible.append(InfeasibleSample(i, *fault.args))
         except CdsmError as error:
-            unreachable = isinstance(error, UnreachableStiffness)
-            status = "stiffness" if unreachable else _STATUS.get(error.status)
-            if status is None:
+            if error.status.is_fault:  # of an argument: the other samples would have it, too
                 raise
             reason = str(error).replace(UNCHECKED, "")
-            infeasible.append(InfeasibleSample(i, status, reason, error))
+            infeasible.append(InfeasibleSample(i, error.status, reason, error))
     values = np.array([achieved(K, directions) for K in found.values()])
     return PathPlan(
         arm=arm,
@@ -142,7 +131,7 @@ def _angles(arm: Manipulator, tip: Array, near: ArrayLike | None) -> Array:
         return solved.angles
     near = f"{coordinates(1e3 * tip)} mm than {1e3 * solved.position_error:.3g} mm"
     remedy = "Ask for a place within reach, or, in Python, start from a guess= nearer to it."
-    raise _Infeasible("posture", f"the tip comes no nearer to {near}. {remedy}")
+    raise _Infeasible(Status.OUT_OF_REACH, f"the tip comes no nearer to {near}. {remedy}")
 
 
 def _plan(goal: Goal, before: Array | None, change: Array, steps: int) -> Array:
@@ -163,7 +152,7 @@ def _plan(goal: Goal, before: Array | None, change: Array, steps: int) -> Array:
     moved = abs(nearest - before)
     worst = int((moved / change).argmax())
     raise _Infeasible(
-        "rate",
+        Status.CHANGE_LIMITED,
         "tensions that hit the target exist, but none were found within the largest change: the "
         f"nearest change {goal.space.pose.arm.cables[worst].name} by {moved[worst]:.4g} N in "
         f"{plural(steps, 'sample')}, and {change[worst]:.4g} N are allowed. Raise "

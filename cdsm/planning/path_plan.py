@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
 from cdsm.errors import CdsmError, listed
 from cdsm.manipulator import Manipulator
+from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import plain, plural
 from cdsm.support.result import Result, quantity, unit
@@ -16,8 +17,6 @@ from cdsm.support.values import Array, Plotted, frozen
 
 if TYPE_CHECKING:
     import pandas
-
-Status = Literal["posture", "balance", "elasticity", "singular", "stiffness", "rate"]
 
 
 @final
@@ -27,10 +26,8 @@ class InfeasibleSample:
 
     Attributes:
         index: Number of the sample, from 0.
-        status: ``"posture"`` (a joint limit, or a tip out of reach), ``"balance"`` (no tensions
-            within the bounds), ``"elasticity"`` (none within the domains), ``"singular"`` (none
-            make the arm stable, or the tip cannot move along u), ``"stiffness"`` (none hit the
-            target) or ``"rate"`` (none hit it within the largest change since the samples before).
+        status: The cause: that of ``error``, or OUT_OF_REACH (the tip comes no nearer) or
+            CHANGE_LIMITED (no tensions within the largest change since the samples before).
         reason: The reason in words, with the remedy.
         error: The error that the plan of this sample raised, with its data; or None.
     """
@@ -112,21 +109,24 @@ class PathPlan(Result, Plotted):
 
     def to_dict(self) -> dict[str, object]:
         """Return the plan in SI for JSON, with units in the keys; a row per planned sample."""
-        told = [{"index": s.index, "status": s.status, "reason": s.reason} for s in self.infeasible]
+        causes = [
+            {"index": sample.index, "status": sample.status.word, "reason": sample.reason}
+            for sample in self.infeasible
+        ]
         names = {"joints": self.arm.joint_names, "cables": self.arm.cables.names}
-        return plain(names) | super().to_dict() | {"infeasible": told}
+        return plain(names) | super().to_dict() | {"infeasible": causes}
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with a row and the status of each sample; needs pandas (CdsmError)."""
-        failed = {each.index: each for each in self.infeasible}
+        causes = {sample.index: (sample.status, sample.reason) for sample in self.infeasible}
         table = super().to_pandas().reindex(range(len(self.target))).rename_axis("sample")
         # joints have their own names, as in the files that are read as a path
         table = table.rename(columns=lambda column: column.removeprefix("angles "))
-        status = [failed[i].status if i in failed else "planned" for i in table.index]
-        table.insert(0, "status", status)
+        rows = [causes.get(index, (Status.OK, "")) for index in table.index]
+        table.insert(0, "status", [status.word for status, _ in rows])
         for k, column in enumerate(np.reshape(self.target, (len(table), -1)).T):
             table[f"target {k + 1} [N/m]" if self.target.ndim > 1 else "target [N/m]"] = column
-        return table.assign(reason=[failed[i].reason if i in failed else "" for i in table.index])
+        return table.assign(reason=[reason for _, reason in rows])
 
     def __str__(self) -> str:
         lines = [f"{len(self.planned)} of {plural(len(self.target), 'sample')} planned"]
@@ -135,9 +135,11 @@ class PathPlan(Result, Plotted):
             lines[0] += f", with {F.min():.4g} to {F.max():.4g} N"
         if len(self.planned) > 1:
             lines[0] += f", which change by up to {self.steps.max():.4g} N per sample"
-        for status in dict.fromkeys(each.status for each in self.infeasible):
-            found = [each for each in self.infeasible if each.status == status]
-            which = f"sample{'s' * (len(found) > 1)} {listed([str(s.index) for s in found])}"
-            at_first = "at first " if len(found) > 1 else ""
-            lines.append(f"{which}: {status}: {at_first}{found[0].reason}")
+        for status in dict.fromkeys(sample.status for sample in self.infeasible):
+            samples = [sample for sample in self.infeasible if sample.status == status]
+            plural_s = "s" * (len(samples) > 1)
+            numbers = listed([str(sample.index) for sample in samples])
+            at_first = "at first " if len(samples) > 1 else ""
+            reason = f"{at_first}{samples[0].reason}"
+            lines.append(f"sample{plural_s} {numbers}: {status.title}: {reason}")
         return "\n".join(lines)

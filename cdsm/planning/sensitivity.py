@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import Literal, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput
+from cdsm.errors import CdsmError, InvalidInput
 from cdsm.planning.tension_space import FAR, form_by_tension, unstable
 from cdsm.posture import Posture
+from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import aligned, coordinates, without_rounding
@@ -20,8 +21,6 @@ from cdsm.support.result import Result, unit
 from cdsm.support.validation import NO_WRENCH, Direction, bound, instance, scalar, unit_direction
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension, distribute_tension
-
-End = Literal["buckling", "balance", "elasticity", "maximum", "none"]
 
 _SAMPLES = 200  # bounds of a curve of saturation, evenly on a scale of logarithms
 _SMALLEST = 1e-4  # second bound of such a curve at least, over the last one
@@ -137,9 +136,9 @@ class Saturation(Result, Plotted):
             which tension softens the arm.
         tension: The least tensions with the lower bound ``bound`` or, if that is inf, the last one.
         stiffness: K_θ under these tensions.
-        limit: What ends the curve: ``"buckling"``, ``"balance"`` (no tensions balance the arm),
-            ``"elasticity"`` (a tension leaves the domain of its cable), ``"maximum"`` (the upper
-            bound of a tension), or ``"none"``.
+        limit: What ends the curve: UNSTABLE (the arm buckles), INFEASIBLE or SOLVER_FAILED (no
+            tensions balance it), OUTSIDE_ELASTICITY (a tension leaves the domain of its cable),
+            AT_MAXIMUM (the upper bound of a tension), or OK (nothing).
         minimum: Lower bounds of the curve (n,) [N], ascending, the last but one step before its
             end.
         along: Stiffness along u under the least tensions with these bounds (n,) [N/m].
@@ -155,7 +154,7 @@ class Saturation(Result, Plotted):
     stiffest: float = field(metadata=unit("N"))
     tension: Tension = field(metadata=unit("N", "cable"))
     stiffness: Stiffness
-    limit: End = field(metadata=unit("1"))
+    limit: Status = field(metadata=unit("1"))
     minimum: Array = field(metadata=unit("N", "minimum"))
     along: Array = field(metadata=unit("N/m", "minimum"))
 
@@ -176,7 +175,8 @@ class Saturation(Result, Plotted):
         if self.minimum[0] < self.stiffest < end:
             lines.append(f"above {self.stiffest:.4g} N tension makes the arm softer")
         model = frictionless_model(self.posture.arm)
-        return "\n".join([*lines, f"looked at up to {end:.4g} N, limit: {self.limit} ({model})"])
+        limit = "" if self.limit is Status.OK else f", where {self.limit.message}"
+        return "\n".join([*lines, f"looked at up to {end:.4g} N{limit} ({model})"])
 
 
 def saturation(
@@ -228,10 +228,11 @@ def saturation(
     laws = [cable.elasticity for cable in arm.cables if cable.control == "position"]
     low = max([start, *(law.low for law in laws)])
     at(low).require_mobile(u)
-    highest: list[tuple[float, End]] = [(FAR * max(float(at(low).tension.max()), 1.0), "none")]
-    highest += [(law.high, "elasticity") for law in laws]
-    highest += [(float(each), "maximum") for each in arm.laws.narrowed(ceiling, ceiling)[1]]
-    high, limit = min(highest, key=lambda each: each[0])
+    highest = [(FAR * max(float(at(low).tension.max()), 1.0), Status.OK)]
+    highest += [(law.high, Status.OUTSIDE_ELASTICITY) for law in laws]
+    own_maximum = arm.laws.narrowed(ceiling, ceiling)[1]
+    highest += [(float(tension), Status.AT_MAXIMUM) for tension in own_maximum]
+    high, limit = min(highest, key=lambda end: end[0])
     stable: list[float] = []
     tried = [low, *np.geomspace(max(low, _SMALLEST * high), max(low, high), _SAMPLES)[1:].tolist()]
     for lower in tried:
@@ -239,12 +240,12 @@ def saturation(
             if at(lower).is_stable:
                 stable.append(lower)
             elif stable:
-                limit = "buckling"
+                limit = Status.UNSTABLE
                 break
         except CdsmError as error:
-            if not error.status:
+            if error.status.is_fault:
                 raise
-            limit = "elasticity" if isinstance(error, ElasticityRangeError) else "balance"
+            limit = error.status
             break
     if not stable:
         found = [at(b) for b in tried if b < lower] or [at(low)]
@@ -256,7 +257,7 @@ def saturation(
     first = int((along >= part * along[top]).argmax())
     beside = slice(max(first - 1, 0), first + 1)
     where = float(np.interp(part * along[top], along[beside], bounds[beside]))
-    if limit == "none" and top == len(stable) - 1 and first > 0:
+    if limit is Status.OK and top == len(stable) - 1 and first > 0:
         where = math.inf
     K = at(min(where, stable[-1]))
     assert K.distribution is not None

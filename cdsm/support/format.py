@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.status import Status
 from cdsm.support.values import Array
 
 MODEL: Final = "frictionless, rigid links, tangent"
@@ -70,6 +71,8 @@ def _plain(value: Any) -> Any:
         return plain(value)
     if hasattr(value, "to_dict"):
         return _plain(value.to_dict())
+    if isinstance(value, Status):
+        return value.word
     if isinstance(value, (np.ndarray, np.generic)):
         return _plain(value.tolist())
     if isinstance(value, (list, tuple)):

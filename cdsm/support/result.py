@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput, need
+from cdsm.status import Status
 from cdsm.support.files import as_path, write_file
 from cdsm.support.format import JointUnits, key, plain, span
 from cdsm.support.values import ReadOnlyState
@@ -158,6 +159,7 @@ class Result(ReadOnlyState):
         for name, metadata in told.items():
             of = metadata["unit"]
             value = getattr(self, name)
+            value = value.word if isinstance(value, Status) else value
             dims = metadata["dims"]
             if "direction" in dims and np.ndim(value) < len(dims):
                 dims = tuple(dim for dim in dims if dim != "direction")

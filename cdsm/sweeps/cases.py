@@ -21,7 +21,7 @@ from cdsm.measures.indices import principal_stiffness, tension_factor
 from cdsm.measures.payload import largest_force
 from cdsm.measures.polytope import balanced, polytope_of
 from cdsm.posture import Posture
-from cdsm.support.status import Status
+from cdsm.status import Status
 from cdsm.support.validation import flag, quantity
 from cdsm.support.values import Array
 from cdsm.tension import checked_bounds, grip

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import FileError, InvalidInput
+from cdsm.status import ENTRY_STATUSES
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import JointUnits
 from cdsm.support.progress import progress_bar
-from cdsm.support.status import Status
 from cdsm.support.validation import XYZ
 from cdsm.support.values import Array
 from cdsm.sweeps.cases import CASES, QUANTITIES, Cases
@@ -122,8 +122,13 @@ class Labelled(Cases):
         """Return the attributes of an output or of ``status``."""
         if name == "status":
             words = "what became of the entry; NaN stands only where it says so"
-            flags = {"flag_meanings": " ".join(kind.name.lower() for kind in Status)}
-            return {"long_name": words, "units": "1", **flags, "flag_values": [*map(int, Status)]}
+            flags = {"flag_meanings": " ".join(status.word for status in ENTRY_STATUSES)}
+            return {
+                "long_name": words,
+                "units": "1",
+                **flags,
+                "flag_values": [*map(int, ENTRY_STATUSES)],
+            }
         units = QUANTITIES[name].units
         of_slides = {"N m": "N", "N m rad-1": "N m-1"}
         if units in of_slides:

@@ -21,10 +21,11 @@ from numpy.typing import ArrayLike
 from cdsm.batch.distribution import given_wrench
 from cdsm.errors import CdsmError, FileError, InvalidInput, need
 from cdsm.manipulator import Manipulator
+from cdsm.status import Status
 from cdsm.support.files import as_path, require_folder
 from cdsm.support.progress import progress_bar
 from cdsm.support.result import write_labelled
-from cdsm.support.status import Status, check_sweep, tidy
+from cdsm.support.status import check_sweep, tidy
 from cdsm.support.validation import (
     NO_WRENCH,
     XYZ,

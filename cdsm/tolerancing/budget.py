@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 from cdsm.batch.quantities import Codes
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
+from cdsm.status import Status
 from cdsm.stiffness_matrix.prints import verdict
 from cdsm.support.format import span, with_uncertainty
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.status import Status
 from cdsm.support.validation import Direction, fraction, instance
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension

@@ -15,9 +15,9 @@ from cdsm.batch.quantities import Codes
 from cdsm.batch.solution import Rows
 from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
+from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import coordinates
-from cdsm.support.status import Status
 from cdsm.support.validation import Direction, flag, one_of, unit_direction
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.tension import Tension

@@ -13,10 +13,10 @@ from cdsm.batch.distribution import checked_threads
 from cdsm.batch.quantities import Codes
 from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
+from cdsm.status import Status
 from cdsm.support.format import with_uncertainty
 from cdsm.support.progress import progress_bar
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.status import Status
 from cdsm.support.validation import Direction, flag, fraction, whole_number
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension

@@ -21,11 +21,12 @@ from cdsm.kinematics import inverse_kinematics
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path import checked_path
 from cdsm.plots.style import MM
+from cdsm.status import Status
 from cdsm.support.validation import instance, quantity, vector, whole_number
 from cdsm.support.values import Array
 from cdsm.view.panel import Panel
 from cdsm.view.scene import HANDLE, Scene
-from cdsm.view.state import Condition, Setting, Shown, show
+from cdsm.view.state import Setting, Shown, show
 
 if TYPE_CHECKING:
     import viser
@@ -185,7 +186,7 @@ class View:
         except Exception as error:  # a bug must not leave outdated numbers on the page
             _LOG.exception("the view cannot show %s", setting := self._panel.setting)
             problem = f"{type(error).__name__}: {error}"
-            self._put(Shown(setting=setting, condition=Condition.FAILED, problem=problem))
+            self._put(Shown(setting=setting, status=Status.FAILED, problem=problem))
 
     def _put(self, shown: Shown) -> None:
         with self._server.atomic():

@@ -13,11 +13,12 @@ import numpy as np
 from cdsm.manipulator import Manipulator
 from cdsm.measures.indices import principal_stiffness
 from cdsm.plots.style import MM, N_PER_MM
+from cdsm.status import Status
 from cdsm.stiffness_matrix.prints import model_of
 from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.values import Array
 from cdsm.view.scene import ELLIPSOID, FORCE, SLIDES, STICKS, Scene
-from cdsm.view.state import Color, Condition, Setting, Shown
+from cdsm.view.state import Color, Setting, Shown
 from cdsm.wires.catalogue import wires_text
 
 if TYPE_CHECKING:
@@ -39,10 +40,10 @@ _RED = "#c53030"
 _AMBER = "#b7791f"
 _GREY = "#718096"
 _COLORS: Final = {
-    Condition.STABLE: _GREEN,
-    Condition.UNSTABLE: _RED,
-    Condition.SINGULAR: _RED,
-    Condition.MOVED: _AMBER,
+    Status.OK: _GREEN,
+    Status.UNSTABLE: _RED,
+    Status.SINGULAR: _RED,
+    Status.MOVED: _AMBER,
 }
 _BOX: Final = '<div style="height:{};overflow-y:auto;font-size:0.8em">\n\n{}\n\n</div>'
 """Box of fixed height, so that sliders do not move while they are dragged."""
@@ -176,9 +177,10 @@ class Panel:
 
 
 def results_text(shown: Shown, scene: Scene, remark: str = "") -> str:
-    """Write the results ``shown``: condition, remarks, table of numbers, legend of the scene."""
-    style = f"background:{_COLORS.get(shown.condition, _GREY)};color:white;text-align:center"
-    parts = [f'<div style="{style}"><b>{shown.condition.value}</b></div>']
+    """Write the results ``shown``: status, remarks, table of numbers, legend of the scene."""
+    style = f"background:{_COLORS.get(shown.status, _GREY)};color:white;text-align:center"
+    parts = [f'<div style="{style}"><b>{shown.heading}</b></div>']
+    parts += [] if shown.status is Status.OK else [f"{shown.status.message}."]
     parts += [escaped(each) for each in (remark, shown.problem) if each]
     parts.append(_table(_numbers(shown)))
     if shown.stiffness is not None:
@@ -257,7 +259,7 @@ def _numbers(shown: Shown) -> Iterator[tuple[str, str, str]]:
             direction = coordinates(principal[f"{name}_direction"], "z.2f")
             yield f"{name}: {direction}", f"{N_PER_MM * principal[name]:.4g}", "N/mm"
         yield "largest compliance", f"{MM / principal['softest']:.3g}", "mm/N"
-    if K is not None and shown.condition is not Condition.SINGULAR:
+    if K is not None and shown.status is not Status.SINGULAR:
         yield "smallest joint stiffness", f"{K.margin:.4g}", K.posture.arm.stiffness_unit()
     if pose is not None:
         yield "tip", _joined(MM * pose.tip[:3, 3], "z.1f"), "mm"

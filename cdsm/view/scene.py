@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from cdsm.errors import GeometryError
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import ELLIPSOID_GRID
+from cdsm.status import Status
 from cdsm.support.values import Array
-from cdsm.view.state import GREY, Color, Condition, Shown
+from cdsm.view.state import GREY, Color, Shown
 
 if TYPE_CHECKING:
     import viser
@@ -84,7 +85,7 @@ class Scene:
             head_radius=0.016 * length,
             head_length=0.04 * length,
         )
-        self._label = self._scene.add_label("/condition", "", anchor="bottom-center")
+        self._label = self._scene.add_label("/status", "", anchor="bottom-center")
         self._names = [self._scene.add_label(f"/names/{i}", "", visible=False) for i in names]
 
     def begin(self, camera: viser.InitialCameraConfig, shown: Shown, path: Array) -> None:
@@ -113,9 +114,9 @@ class Scene:
             frame.visible = pose is not None
         self._ellipsoid.visible = ellipsoid is not None
         # an invalid force has no arrow
-        pushed = pose is not None and shown.condition is not Condition.INVALID
+        pushed = pose is not None and shown.status is not Status.INVALID_INPUT
         self._force.visible = pushed and bool(force.any())
-        self._label.visible = pose is not None and shown.condition is not Condition.STABLE
+        self._label.visible = pose is not None and shown.status is not Status.OK
         shaped = frozenset() if self._shapes is None else self._shapes.rows
         bones, brackets = ([], []) if pose is None else pose._stick_figure(shaped)
         before = shown.reference.bones if shown.reference and shown.rest else ()
@@ -145,7 +146,7 @@ class Scene:
         tip = pose.tip[:3, 3]
         if self._force.visible:
             self._force.points = np.array([[tip, tip + self.force_scale * force]], np.float32)
-        self._label.text = shown.condition.value
+        self._label.text = shown.heading
         self._label.position = tip + 0.1 * self._arm.length * np.eye(3)[2]
 
     def _draw_surroundings(self) -> None:

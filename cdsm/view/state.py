@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import Enum
 from functools import cached_property
 from typing import Any, Final, final
 
@@ -19,6 +18,7 @@ from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
 from cdsm.statics.locked_arm import LockedArm
+from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, distribute_tension
@@ -29,32 +29,6 @@ GREY: Final = (150, 150, 150)
 """Colour of cables with unknown tension."""
 
 _BEAD = 0.013  # half the length of the mark of a hole, as a fraction of the arm's length
-
-
-class Condition(Enum):
-    """State of the arm at a setting, or why it is unknown; the value is the text on the page."""
-
-    STABLE = "STABLE"
-    UNSTABLE = "UNSTABLE"
-    SINGULAR = "ABOUT TO BUCKLE"
-    MOVED = "UNSTABLE: arm moved to another equilibrium"
-    NEUTRAL = "NEUTRAL: arm rests here, but not firmly"
-    NO_EQUILIBRIUM = "NO EQUILIBRIUM FOUND"
-    INFEASIBLE = "INFEASIBLE"
-    OUTSIDE_ELASTICITY = "OUTSIDE THE ELASTICITY"
-    NO_POSTURE = "NO POSTURE"
-    INVALID = "INVALID SETTING"
-    FAILED = "FAILED"
-
-
-_ERRORS: Final = (  # the first class that fits
-    (cdsm.InvalidInput, Condition.INVALID),
-    (cdsm.InfeasibleTension, Condition.INFEASIBLE),
-    (cdsm.ElasticityRangeError, Condition.OUTSIDE_ELASTICITY),
-    (cdsm.SingularStiffness, Condition.SINGULAR),
-    (cdsm.EquilibriumError, Condition.NO_EQUILIBRIUM),
-    (CdsmError, Condition.FAILED),
-)
 
 
 @final
@@ -76,13 +50,18 @@ class Shown:
     """Results at a setting; a missing result is None, never that of a past setting."""
 
     setting: Setting
-    condition: Condition
+    status: Status  # OK: the arm is stable
     problem: str = ""  # error message, or why the arm is not stable, or that it crosses itself
     reference: Posture | None = None  # posture of the setting
     tension: Tension | None = None  # tensions at the reference
     stiffness: Stiffness | None = None  # stiffness at the posture that is shown
     rest: Equilibrium | None = None  # under the force, if the arm sags
     sliding: NDArray[np.bool_] | None = None  # holes (P,) in which a cable slides, if it moved
+
+    @property
+    def heading(self) -> str:
+        """The status as the page has it."""
+        return "STABLE" if self.status is Status.OK else self.status.title
 
     @property
     def posture(self) -> Posture | None:
@@ -99,7 +78,7 @@ class Shown:
     @property
     def source(self) -> Equilibrium | Stiffness | None:
         """What knows the compliance of the tip; None if the arm is not stable as shown."""
-        stable = self.condition in (Condition.STABLE, Condition.MOVED)
+        stable = self.status in (Status.OK, Status.MOVED)
         return (self.rest or self.stiffness) if stable else None
 
     @cached_property
@@ -137,21 +116,21 @@ class Shown:
 
 
 def show(arm: Manipulator, setting: Setting) -> Shown:
-    """Compute the results for an arm at a setting; an error is its condition and problem."""
+    """Compute the results for an arm at a setting; an error is its status and problem."""
     try:
         pose = arm.at(setting.q)
     except CdsmError as error:
-        return Shown(setting=setting, condition=Condition.NO_POSTURE, problem=str(error))
+        return Shown(setting=setting, status=error.status, problem=str(error))
     found: dict[str, Any] = {"setting": setting, "reference": pose}
     try:
         force = np.concatenate([setting.force, np.zeros(3)])
         if setting.pull is not None:
             rest = cdsm.forward_statics(arm, pull=setting.pull, wrench=force)
             found |= {"rest": rest, "stiffness": rest.stiffness}
-            condition = Condition.STABLE if rest.branch == 1.0 else Condition.MOVED
-            condition = Condition.NEUTRAL if rest.neutral or not rest.stable else condition
+            status = Status.OK if rest.branch == 1.0 else Status.MOVED
+            status = Status.NEUTRAL if rest.neutral or not rest.stable else status
             said = "\n".join([*rest.warnings, *rest.pose.remarks])
-            return Shown(**found, condition=condition, problem=said)
+            return Shown(**found, status=status, problem=said)
         wrench = force * (not setting.sag)
         tension = distribute_tension(pose, setting.minimum, setting.maximum, wrench)
         found["tension"] = tension
@@ -160,19 +139,18 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
             _ = K.compliance  # raises if K_θ is singular
             if not K.is_stable:
                 said = "\n".join(K.warnings)  # takes tenths of a second: what would stabilise
-                return Shown(**found, condition=Condition.UNSTABLE, problem=said)
-            return Shown(**found, condition=Condition.STABLE, problem="\n".join(pose.remarks))
+                return Shown(**found, status=Status.UNSTABLE, problem=said)
+            return Shown(**found, status=Status.OK, problem="\n".join(pose.remarks))
         locked = cdsm.stuck_stiffness if arm.has_friction else stiffness
         stable = locked(pose, tension).is_stable
         rest, found["sliding"] = _rest(pose, tension, force)
         found |= {"rest": rest, "stiffness": rest.stiffness}
         _ = rest.compliance
-        condition = Condition.STABLE if stable else Condition.MOVED
-        condition = condition if rest.stable else Condition.NEUTRAL
-        return Shown(**found, condition=condition, problem="\n".join(rest.pose.remarks))
+        status = Status.OK if stable else Status.MOVED
+        status = status if rest.stable else Status.NEUTRAL
+        return Shown(**found, status=status, problem="\n".join(rest.pose.remarks))
     except CdsmError as error:
-        condition = next(each for kind, each in _ERRORS if isinstance(error, kind))
-        return Shown(**found, condition=condition, problem=str(error))
+        return Shown(**found, status=error.status, problem=str(error))
 
 
 def _rest(

@@ -149,7 +149,7 @@ def test_rows_that_the_solver_leaves_open_are_infeasible_only_with_a_proof(
     assert set(lost.tolist()) <= {cdsm.Status.OK, cdsm.Status.SOLVER_FAILED}
 
     def failing(*_: object) -> None:
-        raise cdsm.CdsmError("solver failed.", "SOLVER_FAILED")
+        raise cdsm.CdsmError("solver failed.", cdsm.Status.SOLVER_FAILED)
 
     monkeypatch.setattr(chunk, "solve", failing)
     found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm import control
+from cdsm import Status, control
 from cdsm.control import Command
 from cdsm.planning.path_plan import PathPlan
 from tests.support.tracking import coupled_path, paid_out, small_path
@@ -65,7 +65,7 @@ def test_stiffness_loop_holds_an_arm_with_inertia() -> None:
     sensors = cdsm.Sensors(tension_noise=0.2)
     bounds = {"minimum": 10.0, "maximum": 250.0}
     run = cdsm.track(plan, "stiffness", plant, sensors, steps=10, payload=0.1, **bounds)
-    assert run.outcome == "completed"
+    assert run.outcome is Status.OK
     assert run.rigidity[-1] == pytest.approx(0.9, abs=5e-3)
     assert abs(run.stiffness_error[8:]).max() < 0.03
     assert run.tip_error[8:].max() < 5e-4

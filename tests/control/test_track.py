@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm import control, presets
+from cdsm import Status, control, presets
 from cdsm.cli.options import read_path
 from cdsm.planning.path_plan import PathPlan
 from tests.support.arms import readme_geometry
@@ -19,7 +19,7 @@ BOUNDS: Any = {"minimum": 10.0, "maximum": 250.0}
 def test_feedforward_on_the_arm_it_believes_in_follows_to_rounding() -> None:
     plan = small_path()
     run = cdsm.track(plan, "feedforward", sensors=cdsm.Sensors(encoder=0.0), **BOUNDS)
-    assert run.outcome == "completed"
+    assert run.outcome is Status.OK
     assert not run.warnings
     assert not run.target_unreachable.any()
     at_samples = run.tip_error[::5]
@@ -50,7 +50,7 @@ def test_every_law_holds_the_plan_of_the_arm_it_believes_in(law: str, steps: int
         assert "steps=2 would do" in str(run)
         steps = run.steps_needed
     run = cdsm.track(steep_path(), law, steps=steps, **given)
-    assert run.outcome == "completed"
+    assert run.outcome is Status.OK
     assert not run.warnings
     assert not run.saturated.any()
     assert abs(run.stiffness_error).max() < 0.01
@@ -129,10 +129,10 @@ def test_unstable_loop_is_an_answer_with_its_time() -> None:
     arm = cdsm.Manipulator(plan.arm.geometry, presets.STRAND_1X19.slack_below())
     late, plant = cdsm.Sensors(delay=4), cdsm.QuasiStaticPlant(arm)
     run = cdsm.track(plan, "tension", plant, late, steps=12, payload=0.3, **BOUNDS)
-    assert run.outcome == "diverged"
+    assert run.outcome is Status.DIVERGED
     assert run.tip_error[-1] > 0.1 * plan.arm.length > run.tip_error[-2]
     assert run.time[-1] == pytest.approx(0.05 * (len(run.time) - 1))
-    assert "UNSTABLE" in str(run).splitlines()[0]
+    assert "DIVERGED" in str(run).splitlines()[0]
     assert np.isfinite(run.tips).all()
 
 
@@ -164,7 +164,7 @@ def test_dataset_has_units_and_is_written_whole(tmp_path: Path) -> None:
     path = run.write(tmp_path / "run.nc")
     with xr.open_dataset(path) as again:
         np.testing.assert_array_equal(again["tips"], run.tips)
-        assert again.attrs["outcome"] == "completed"
+        assert again.attrs["outcome"] == "ok"
     assert run.inside.all()
     path_again = read_path(run.write(tmp_path / "run.csv"), run.plan.arm)
     assert path_again.angles is not None
@@ -183,7 +183,7 @@ def test_stiffness_loop_holds_four_newtons_per_millimetre_within_five_percent() 
     for law in ("feedforward", "tension", "stiffness"):
         run = cdsm.track(plan, law, plant, sensors, payload=0.2, steps=3, **BOUNDS)
         worst[law] = abs(run.stiffness_error[1:]).max()  # the first step does not know the wire
-        assert run.outcome == "completed"
+        assert run.outcome is Status.OK
         assert (run.commanded_tension >= 10.0).all()
         assert (run.commanded_tension <= 250.0).all()
         assert run.inside.all()

@@ -186,4 +186,4 @@ def test_a_wrong_optimum_is_corrected_if_it_is_near_and_caught_if_not(
         return
     with pytest.raises(cdsm.CdsmError, match=r"'daqp'.*though one exists") as caught:
         cdsm.distribute_tension(POSE, 10.0, 500.0)
-    assert caught.value.status == "SOLVER_FAILED"
+    assert caught.value.status == cdsm.Status.SOLVER_FAILED

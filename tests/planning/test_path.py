@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm import presets
+from cdsm import Status, presets
 from tests.support import arms
 from tests.support.locked import BUCKLING, LENGTH, STRAND, TABLE, soft, soft_hinge, some_arm
 from tests.support.paths import ARM, DOWN, assert_holds, waving
@@ -46,7 +46,7 @@ def test_path_of_tips_is_that_of_the_angles_that_lead_there() -> None:
     tips[1] = np.array([ARM.geometry.length + 0.25, 0.0, 0.0])
     plan = cdsm.plan_path(ARM, DOWN, 80e3, 50.0, tips=tips[:3], guess=q[0])
     assert plan.planned == (0, 2)
-    assert plan.infeasible[0].status == "posture"
+    assert plan.infeasible[0].status is Status.OUT_OF_REACH
     assert "than 250 mm" in plan.infeasible[0].reason
 
 
@@ -70,9 +70,9 @@ def test_random_arms_keep_to_their_targets_and_rates(seed: int) -> None:
         try:
             cdsm.plan_stiffness(arm.at(q[each.index]), DOWN, targets[each.index], 15.0, 400.0, W)
         except cdsm.UnreachableStiffness:
-            assert each.status == "stiffness"
+            assert each.status is Status.UNREACHABLE_STIFFNESS
         else:
-            assert each.status == "rate"
+            assert each.status is Status.CHANGE_LIMITED
 
 
 def test_every_infeasible_sample_is_named_and_the_path_goes_on() -> None:
@@ -87,7 +87,11 @@ def test_every_infeasible_sample_is_named_and_the_path_goes_on() -> None:
     assert not plan.complete
     assert [each.index for each in plan.infeasible] == [2, 4, 6]
     beyond, loaded, asked = plan.infeasible
-    assert (beyond.status, loaded.status, asked.status) == ("posture", "balance", "stiffness")
+    assert (beyond.status, loaded.status, asked.status) == (
+        Status.BEYOND_LIMITS,
+        Status.INFEASIBLE,
+        Status.UNREACHABLE_STIFFNESS,
+    )
     assert isinstance(beyond.error, cdsm.InvalidInput)
     assert isinstance(loaded.error, cdsm.InfeasibleTension)
     assert isinstance(asked.error, cdsm.UnreachableStiffness)
@@ -97,9 +101,9 @@ def test_every_infeasible_sample_is_named_and_the_path_goes_on() -> None:
     assert (asked.error.low, asked.error.high) == (alone.value.low, alone.value.high)
     assert_holds(plan, 50.0, 500.0)
     for arm, u, least, status, said in (
-        (soft_hinge(), DOWN, 1.01 * BUCKLING, "singular", ""),
-        (soft_hinge(), (1.0, 0.0, 0.0), 10.0, "singular", "cannot move along"),
-        (ARM, DOWN, 900.0, "elasticity", ""),
+        (soft_hinge(), DOWN, 1.01 * BUCKLING, Status.SINGULAR, ""),
+        (soft_hinge(), (1.0, 0.0, 0.0), 10.0, Status.SINGULAR, "cannot move along"),
+        (ARM, DOWN, 900.0, Status.OUTSIDE_ELASTICITY, ""),
     ):
         plan = cdsm.plan_path(arm, u, 1e3, least, angles=np.zeros((2, arm.nv)))
         assert plan.planned == ()
@@ -123,7 +127,7 @@ def test_target_that_jumps_is_hit_again_when_the_motors_are_there(rate: float, l
     )
     failed = [*range(6, 6 + late), *range(13, 13 + late)]
     assert [each.index for each in plan.infeasible] == failed
-    assert {each.status for each in plan.infeasible} <= {"rate"}
+    assert {each.status for each in plan.infeasible} <= {Status.CHANGE_LIMITED}
     np.testing.assert_allclose(plan.tensions, F[list(plan.planned), None] * [1, 1], rtol=1e-9)
     assert_holds(plan, 10.0, math.inf)
     if late:
@@ -168,7 +172,7 @@ def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> Non
     plan = cdsm.plan_path(arm, DOWN, [80e3, 1e7, 81e3], 50.0, angles=waving(3))
     with plan.write(tmp_path / "motors.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [row["status"] for row in rows] == ["planned", "stiffness", "planned"]
+    assert [row["status"] for row in rows] == ["ok", "unreachable_stiffness", "ok"]
     assert rows[1]["reason"] == plan.infeasible[0].reason
     held = [name for name in arm.cables.names if name != "cable2_1"]
     for k, row in enumerate((rows[0], rows[2])):

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 import cdsm
-from cdsm import presets
+from cdsm import Status, presets
 from tests.planning.test_range import stayed
 from tests.support import arms
 from tests.support.locked import BUCKLING, LENGTH, STRAND, H, R, hinge, soft_hinge, some_arm
@@ -45,7 +45,7 @@ def test_hinge_behind_springs_has_its_closed_form_everywhere() -> None:
     expected = brentq(lambda F: closed(F) - 0.95 * curve.max(), 3.0, places[curve.argmax()])
     assert found.bound == pytest.approx(expected, rel=1e-2)
     end = brentq(closed, 300.0, 400.0)
-    assert found.limit == "buckling"
+    assert found.limit is Status.UNSTABLE
     assert 0.95 * end < found.minimum[-1] < end
     np.testing.assert_array_equal(found.stiffness.tension, found.tension.values)
     assert found.stiffness.along(DOWN) == pytest.approx(0.95 * curve.max(), rel=1e-3)
@@ -66,19 +66,19 @@ def test_bound_has_the_fraction_of_the_largest_stiffness(name: str) -> None:
 def test_what_ends_the_curve_is_told() -> None:
     pose = arms.random_posture(presets.virtual_prototype(), 5)
     found = cdsm.saturation(pose, DOWN)
-    assert found.limit == "elasticity"
+    assert found.limit is Status.OUTSIDE_ELASTICITY
     assert 0.9 * 810.0 < cdsm.distribute_tension(pose, found.minimum[-1]).values.max() <= 810.0
     limited = cdsm.saturation(pose, DOWN, maximum=300.0)
-    assert limited.limit == "balance"
+    assert limited.limit is Status.INFEASIBLE
     with pytest.raises(cdsm.InfeasibleTension):
         cdsm.distribute_tension(pose, limited.minimum[-1] * 1.05, 300.0)
     straight = cdsm.saturation(springy(), DOWN, 3.0, 20.0)
-    assert (straight.limit, straight.minimum[-1]) == ("maximum", pytest.approx(20.0))
+    assert (straight.limit, straight.minimum[-1]) == (Status.AT_MAXIMUM, pytest.approx(20.0))
 
 
 def test_stiffness_that_tension_raises_without_end_never_saturates() -> None:
     found = cdsm.saturation(stayed(), DOWN, 10.0)
-    assert (found.limit, found.bound) == ("none", math.inf)
+    assert (found.limit, found.bound) == (Status.OK, math.inf)
     assert found.stiffest == found.minimum[-1]
     only_softer = cdsm.saturation(soft_hinge().at([0.0]), DOWN, 10.0)
     assert only_softer.bound == only_softer.stiffest == 10.0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.status import Status
+from cdsm.status import Status
 from cdsm.tolerancing.budget import Uncertainty
 from cdsm.tolerancing.measurand import MeasurandName, measurand_of
 from tests.support import arms

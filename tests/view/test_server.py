@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.status import Status
 from cdsm.view import serve
 from cdsm.view.live_view import View
-from cdsm.view.state import Condition
 from tests.support import foreign
 from tests.view.test_state import DEGREES, STABLE, soft_arm
 
@@ -64,14 +64,14 @@ def test_the_scene_holds_the_arm_where_the_api_has_it() -> None:
 
 def test_numbers_beyond_all_limits_do_not_end_the_view(view: View) -> None:
     joint, force = view._panel.joints[0], view._panel._load[2]
-    for slider, condition in ((joint, Condition.NO_POSTURE), (force, Condition.INVALID)):
+    for slider, status in ((joint, Status.BEYOND_LIMITS), (force, Status.INVALID_INPUT)):
         before = slider.value
         slider.value = 1e16  # type: ignore[misc]
-        assert view.shown.condition is condition
+        assert view.shown.status is status
         assert not node(view, "/force").visible
         assert not node(view, "/ellipsoid").visible
         slider.value = before  # type: ignore[misc]
-        assert view.shown.condition is Condition.STABLE
+        assert view.shown.status is Status.OK
         assert node(view, "/arm").visible
 
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.status import Status
 from cdsm.support.values import Array
 from cdsm.view.panel import python_text, results_text, tensions_text
 from cdsm.view.scene import Scene
-from cdsm.view.state import Condition, Setting, Shown, show
+from cdsm.view.state import Setting, Shown, show
 from tests.support import foreign
 from tests.support.arms import readme_geometry
 
@@ -68,7 +69,7 @@ def test_a_stable_arm_is_shown_with_the_numbers_of_the_api() -> None:
     pull = cdsm.distribute_tension(pose, STABLE, 200.0, (0.5, -1.0, -2.0, 0, 0, 0))
     K = cdsm.stiffness(pose, pull)
     said = numbers(shown)
-    assert shown.condition is Condition.STABLE
+    assert shown.status is Status.OK
     assert said["stiffness along x, y, z"] == along(K)
     assert said["smallest joint stiffness"] == f"{K.margin:.4g}"
     assert said["tip"] == ", ".join(f"{1000.0 * x:.1f}" for x in pose.tip[:3, 3])
@@ -79,33 +80,33 @@ def test_a_stable_arm_is_shown_with_the_numbers_of_the_api() -> None:
     (softest,) = (float(value) for name, value in said.items() if name.startswith("softest"))
     assert softest == pytest.approx(1.0 / largest, rel=2e-3)
     beyond = show(arm, setting(arm, q=np.full(6, 3.0)))
-    assert (beyond.condition, numbers(beyond)) == (Condition.NO_POSTURE, {})
+    assert (beyond.status, numbers(beyond)) == (Status.BEYOND_LIMITS, {})
     assert "joint1_1" in beyond.problem
 
 
 @pytest.mark.parametrize(
-    ("minimum", "force", "condition"),
+    ("minimum", "force", "status"),
     [
-        (UNSTABLE, 0.0, Condition.UNSTABLE),
-        (STABLE, -20.0, Condition.UNSTABLE),
-        (INFEASIBLE, 0.0, Condition.INFEASIBLE),
-        (201.0, 0.0, Condition.INVALID),
-        (STABLE, 1e16, Condition.INVALID),
+        (UNSTABLE, 0.0, Status.UNSTABLE),
+        (STABLE, -20.0, Status.UNSTABLE),
+        (INFEASIBLE, 0.0, Status.INFEASIBLE),
+        (201.0, 0.0, Status.INVALID_INPUT),
+        (STABLE, 1e16, Status.INVALID_INPUT),
     ],
 )
 def test_where_the_arm_does_not_hold_no_stiffness_of_the_tip_is_said(
-    minimum: float, force: float, condition: Condition
+    minimum: float, force: float, status: Status
 ) -> None:
     arm = soft_arm()
     shown = show(arm, setting(arm, minimum, (0.0, 0.0, force)))
     said = numbers(shown)
-    assert shown.condition is condition
-    assert condition.value in text(shown)
+    assert shown.status is status
+    assert status.title in text(shown)
     assert shown.problem
     assert shown.ellipsoid is None
     assert not any(name.startswith(("stiffness", "soft", "stiff", "largest c")) for name in said)
-    assert ("smallest joint stiffness" in said) == (condition is Condition.UNSTABLE)
-    if condition is Condition.UNSTABLE:
+    assert ("smallest joint stiffness" in said) == (status is Status.UNSTABLE)
+    if status is Status.UNSTABLE:
         assert float(said["smallest joint stiffness"]) < 0.0
         assert "it would hold with" in shown.problem
 
@@ -136,7 +137,7 @@ def test_what_is_shown_is_the_equilibrium_of_the_arm_tensioned_without_the_force
         (shown, test.displacements[-1]),
         (stuck, history.displacement[0]),
     ):
-        assert each.condition is Condition.STABLE
+        assert each.status is Status.OK
         assert each.rest is not None
         np.testing.assert_allclose(each.rest.displacement, by, atol=1e-9)
     assert 0.0 < history.displacement[0] @ FORCE < rest.displacement @ FORCE
@@ -151,7 +152,7 @@ def test_what_is_shown_is_the_equilibrium_of_the_arm_tensioned_without_the_force
     assert f"{len(sticking)} holes stick" in text(stuck)
     assert numbers(stuck)["stiffness along x, y, z"] == along(history.stiffness(0))
     moved = sagged(arm, UNSTABLE, (0.0, 0.0, 0.0))
-    assert moved.condition is Condition.MOVED
+    assert moved.status is Status.MOVED
     assert "moved to another equilibrium" in text(moved)
 
 
@@ -193,7 +194,7 @@ def test_what_motors_pull_gives_the_posture_and_its_numbers() -> None:
     shown = pulled(0.004, -0.006, 0.0)
     force = [0.0, 0.0, -0.05, 0.0, 0.0, 0.0]
     rest = cdsm.forward_statics(rod(), pull=[0.004, -0.006, 0.0], wrench=force)
-    assert shown.condition is Condition.STABLE
+    assert shown.status is Status.OK
     assert shown.posture is not None
     np.testing.assert_allclose(shown.posture.tip, rest.pose.tip, atol=1e-12)
     said = numbers(shown)
@@ -203,6 +204,6 @@ def test_what_motors_pull_gives_the_posture_and_its_numbers() -> None:
     names = ran(rod(), shown.setting)
     np.testing.assert_allclose(names["rest"].pose.q, rest.pose.q, atol=1e-12)
     beyond = pulled(1.0, 0.0, 0.0)  # more wire than a cable has
-    assert beyond.condition is Condition.INVALID
+    assert beyond.status is Status.INVALID_INPUT
     assert (beyond.tensions, beyond.stiffness) == (None, None)
     assert "leaves" in beyond.problem
