@@ -79,10 +79,16 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1, least: float = 
     return f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
 
 
-def unknown(kind: str, name: object, known: Iterable[str], remedy: str = "") -> InvalidInput:
-    """Return the error for a ``kind``, e.g. a link, called ``name`` that is not among ``known``."""
+def unknown(
+    kind: str, name: object, known: Iterable[str], remedy: str = "", meant: Sequence[str] = ()
+) -> InvalidInput:
+    """Return the error for a ``kind``, e.g. a link, called ``name`` that is not among ``known``.
+
+    ``meant`` are known names that fit it better than those that are spelled alike.
+    """
     known = tuple(known)
-    hint = did_you_mean(str(name), known, 3) or "."
+    fitting = f"; did you mean {' or '.join(map(repr, meant[:3]))}?" if meant else ""
+    hint = fitting or did_you_mean(str(name), known, 3) or "."
     error = InvalidInput(kind, "unknown")
     said = f"no {kind} is called {name!r}{hint} Known: {listed(known, 12)}. {remedy}"
     error.args = (said.rstrip(),)

@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.quantities import UNITS_OF_JOINTS
 from cdsm.status import Status
 from cdsm.support.values import Array
 
@@ -119,6 +120,10 @@ class JointUnits(NamedTuple):
             column = found.setdefault("ways_m" if slides else "angles_rad", {})
             column[name] = q[..., i].tolist()  # type: ignore[index]
         return found
+
+    def of(self, unit: str) -> str:
+        """Return the SI unit of a quantity, whose ``unit`` may depend on the joints."""
+        return self.joined(*UNITS_OF_JOINTS[unit]) if unit in UNITS_OF_JOINTS else unit
 
     def joined(self, turning: str, sliding: str, joint: int | None = None) -> str:
         """Return the text of a joint, or of all: ``turning``, ``sliding``, or both with "or"."""
