@@ -8,17 +8,11 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.batch.quantities import (
-    OF_POSTURE,
-    OF_TENSION,
-    READINGS,
-    TERMS,
-    Codes,
-    read,
-)
+from cdsm.batch.quantities import READINGS, TERMS, Codes, read
 from cdsm.batch.rows import Body, Indices, Pose, one_by_one, rows_of, side_by_side
 from cdsm.errors import CdsmError
 from cdsm.manipulator import LIMIT_SLACK
+from cdsm.quantities import QUANTITIES
 from cdsm.routing import SHORTEST_SEGMENT
 from cdsm.status import Status
 from cdsm.support.values import Array, frozen
@@ -33,6 +27,7 @@ _Scalar = TypeVar("_Scalar", np.float64, np.bool_)
 _LOST = (Status.BEYOND_LIMITS, Status.COINCIDENT_SITES)
 _NO_TENSION = (*_LOST, Status.INFEASIBLE, Status.SOLVER_FAILED)
 _NO_STIFFNESS = (*_NO_TENSION, Status.OUTSIDE_ELASTICITY)
+_WITHOUT = {"posture": _LOST, "tension": _NO_TENSION, "stiffness": _NO_STIFFNESS}
 _PIVOT = 1e-4  # smallest relative pivot with which K_θ is regular, and needs no exchange of rows
 
 
@@ -83,7 +78,7 @@ class Chunk:
             L = self._alone(at.length)
             pull = self._alone(F)
             laws = rows.arm.laws
-            if self._names <= {*OF_POSTURE, *OF_TENSION}:
+            if all(QUANTITIES[name].needs != "stiffness" for name in self._names):
                 k = np.zeros_like(pull)
             elif rows.springs is not None:
                 k = rows.springs(L, pull, self._part)
@@ -229,10 +224,7 @@ class Chunk:
         status = self._status
         if not status.any():
             return value
-        kinds = (
-            _LOST if name in OF_POSTURE else _NO_TENSION if name in OF_TENSION else _NO_STIFFNESS
-        )
-        lost = np.isin(status, kinds)
+        lost = np.isin(status, _WITHOUT[QUANTITIES[name].needs])
         return np.where(lost.reshape(-1, *[1] * (value.ndim - 1)), np.nan, value)
 
     def _empty(self, name: str, blocks: int, *shape: int) -> Array:

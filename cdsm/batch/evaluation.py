@@ -17,19 +17,17 @@ from cdsm.batch.distribution import (
     given_wrench,
     postures,
 )
-from cdsm.batch.quantities import DIMENSIONS, OF_POSTURE, Codes, OfPostures
+from cdsm.batch.quantities import Codes, OfPostures
 from cdsm.batch.solution import Rows
 from cdsm.errors import InvalidInput, unknown
 from cdsm.manipulator import ANOTHER_ARM, Manipulator
+from cdsm.quantities import QUANTITIES, require_name
 from cdsm.status import Status
 from cdsm.support.format import coordinates
 from cdsm.support.status import summary
-from cdsm.support.validation import Direction, flag, instance, one_of, unit_directions
+from cdsm.support.validation import Direction, flag, instance, unit_directions
 from cdsm.support.values import Array, Named, frozen
 from cdsm.tension import checked_bounds
-
-OUTPUTS = (*(name for name in DIMENSIONS if name != "tension"), "tension")
-"""Names of the quantities that :func:`evaluate` computes."""
 
 DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
 """Default outputs: pose of the tip, its compliance, and the stability margin."""
@@ -159,7 +157,7 @@ def evaluate(
         bounds = checked_bounds(arm, minimum, math.inf if maximum is None else maximum, rows)
     elif maximum is not None:
         raise InvalidInput("maximum", "belongs to minimum=: give that too.")
-    needy = [name for name in names if name not in OF_POSTURE]
+    needy = [name for name in names if QUANTITIES[name].needs != "posture"]
     if needy and given is None and minimum is None:
         raise InvalidInput(
             "tension",
@@ -197,7 +195,7 @@ def evaluate(
 def _checked_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
     if not isinstance(outputs, (list, tuple)):
         raise InvalidInput("outputs", f"{outputs!r} given; a list or tuple of names is needed.")
-    names = tuple(one_of("output", name, OUTPUTS) for name in outputs)
+    names = tuple(require_name("output", name, "batch") for name in outputs)
     for name in names:
         if names.count(name) > 1:
             raise InvalidInput("outputs", f"{name!r} is named twice.")

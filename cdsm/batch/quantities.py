@@ -1,8 +1,8 @@
-"""Quantities of a batch: dimensions, units, what each one needs, and what is read off many K_θ."""
+"""Quantities of a batch: their shapes and labels, and what is read off many K_θ."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from cdsm import readings
 from cdsm.manipulator import Manipulator
+from cdsm.quantities import AXES, QUANTITIES, names_of
 from cdsm.status import ENTRY_STATUSES, Status
-from cdsm.support.format import JointUnits
 from cdsm.support.result import Result
 from cdsm.support.status import summary
 from cdsm.support.values import Array, frozen
@@ -23,46 +23,9 @@ if TYPE_CHECKING:
 
 Codes = NDArray[np.uint8]
 
-_JOINTS: Final = ("joint", "joint_column")
-_MOTIONS: Final = ("motion", "motion_column")
-_AXES: Final = ("axis", "axis_column")
-_SIX: Final = ("x", "y", "z", "rx", "ry", "rz")
+READINGS: Final = ("margin", "pseudoinverse", "along", "compliance", "cartesian")
+"""Quantities that :func:`read` computes."""
 
-DIMENSIONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
-    # these need the joint angles alone
-    "tip": (("row", "column"), "1"),
-    "jacobian": (("motion", "joint"), "1"),
-    "cable_lengths": (("cable",), "m"),
-    "length_jacobian": (("cable", "joint"), "lever"),
-    "gravity_torque": (("joint",), "torque"),
-    "gravity": (_JOINTS, "joint stiffness"),
-    "springs": (_JOINTS, "joint stiffness"),
-    # these also need tensions
-    "tension": (("cable",), "N"),
-    "residual": (("joint",), "torque"),
-    "active": (_JOINTS, "joint stiffness"),
-    "load": (_JOINTS, "joint stiffness"),
-    # these also need the stiffness of the cables
-    "cable_stiffness": (("cable",), "N/m"),
-    "passive": (_JOINTS, "joint stiffness"),
-    "joint": (_JOINTS, "joint stiffness"),
-    "margin": ((), "joint stiffness"),
-    "pseudoinverse": (_AXES, "N/m"),
-    # these also need a regular K_θ
-    "along": (("direction",), "N/m"),
-    "compliance": (_MOTIONS, "1"),
-    "cartesian": (_AXES, "N/m"),
-}
-"""Dimensions and unit of each quantity.
-
-The unit is 1 for matrices whose entries have different SI units. "torque", "joint stiffness" and
-"lever" depend on the joints of the arm: N m, N m/rad and m/rad, or N, N/m and 1 for prismatic ones.
-"""
-
-_NAMES: Final = tuple(DIMENSIONS)
-OF_POSTURE: Final = _NAMES[: _NAMES.index("tension")]
-OF_TENSION: Final = _NAMES[_NAMES.index("tension") : _NAMES.index("cable_stiffness")]
-READINGS: Final = _NAMES[_NAMES.index("margin") :]
 TERMS: Final = ("active", "passive", "gravity", "load", "springs")
 
 
@@ -71,8 +34,8 @@ def shapes_of(nv: int, cables: int, directions: int) -> dict[str, tuple[int, ...
     sizes = {"joint": nv, "cable": cables, "direction": directions}
     sizes |= {"row": 4, "column": 4, "motion": 6, "axis": 3}
     return {
-        name: tuple(sizes[each.removesuffix("_column")] for each in dims)
-        for name, (dims, _) in DIMENSIONS.items()
+        name: tuple(sizes[dim.removesuffix("_column")] for dim in QUANTITIES[name].dims)
+        for name in names_of("batch")
     }
 
 
@@ -117,26 +80,20 @@ class OfPostures(Result):
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.arm.name}, {summary(self.status)}>"
 
-    def _units(self) -> dict[str, str]:
-        return {**super()._units(), "lever": JointUnits(self.arm.slides).joined("m/rad", "1")}
-
-    def _labels(self) -> dict[str, Sequence[object]]:
-        labels = super()._labels()
-        return {**labels, **dict.fromkeys(_MOTIONS, _SIX), "axis_column": labels["axis"]}
-
     def _of(self, values: Mapping[str, Array]) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
         """Yield name, value, unit and dimensions of ``values`` (B, …)."""
         units = self._units()
         yield "q", self.q, units["joint"], ("pose", "joint")
         for name, value in values.items():
-            dims, unit = DIMENSIONS[name]
+            dims = QUANTITIES[name].dims
+            unit = QUANTITIES[name].unit
             if name == "tip":
                 yield "tip_position", value[:, :3, 3], "m", ("pose", "axis")
-                yield "tip_rotation", value[:, :3, :3], "1", ("pose", *_AXES)
+                yield "tip_rotation", value[:, :3, :3], "1", ("pose", *AXES)
                 continue
             # one direction has no axis of its own; a variable must not have the name of a dimension
             shown = value[:, None] if name == "along" and value.ndim == 1 else value
-            label = "joint_stiffness" if name == "joint" else name
+            label = f"{name}_stiffness" if name in dims else name
             yield label, shown, units.get(unit, unit), ("pose", *dims)
         yield "status", self.status, "1", ("pose",)
 

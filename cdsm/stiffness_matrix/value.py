@@ -24,7 +24,7 @@ from cdsm.stiffness_matrix.prints import Remedy, find_remedies, verdict
 from cdsm.stiffness_matrix.report import Report
 from cdsm.stiffness_matrix.shares import Shares
 from cdsm.support.format import coordinates, plain
-from cdsm.support.result import Result, quantity, unit
+from cdsm.support.result import Result, tabulated, unit, unit_of
 from cdsm.support.validation import Direction, one_of, unit_direction, unit_directions
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
@@ -37,8 +37,6 @@ Term = Literal["active", "passive", "gravity", "load", "springs", "joint"]
 Joints = slice | NDArray[np.intp]
 
 _ORTHOGONAL = 1e-9  # largest product of two unit directions that are orthogonal
-
-_SQUARE = unit("joint stiffness", "joint", "joint_column")
 
 
 @final
@@ -75,16 +73,15 @@ class Stiffness(Result):
     _rows = "cable"
 
     posture: Posture
-    active: Array = field(metadata=_SQUARE)
-    passive: Array = field(metadata=_SQUARE)
-    gravity: Array = field(metadata=_SQUARE)
-    load: Array = field(metadata=_SQUARE)
-    springs: Array = field(metadata=_SQUARE)
-    # in exports, a variable must not have the name of a dimension
-    joint: Array = field(metadata={**_SQUARE, "name": "joint_stiffness"})
-    tension: Array = field(metadata=unit("N", "cable"))
+    active: Array = field(metadata=unit_of("active"))
+    passive: Array = field(metadata=unit_of("passive"))
+    gravity: Array = field(metadata=unit_of("gravity"))
+    load: Array = field(metadata=unit_of("load"))
+    springs: Array = field(metadata=unit_of("springs"))
+    joint: Array = field(metadata=unit_of("joint_stiffness"))
+    tension: Array = field(metadata=unit_of("tension"))
     wrench: Array = field(metadata=unit("N and N m", "component"))
-    cable_stiffness: Array = field(metadata=unit("N/m", "cable"))
+    cable_stiffness: Array = field(metadata=unit_of("cable_stiffness"))
     free_length: Array | None = None
     distribution: Tension | None = None
     friction: Friction = "frictionless"
@@ -99,7 +96,7 @@ class Stiffness(Result):
         l_0 = self.free_length
         return laws.original_lengths(L, self.tension) if l_0 is None else l_0
 
-    @quantity("torque", "joint")
+    @tabulated
     def residual(self) -> Array:
         """J_Lᵀ F − (J_Xᵀ W − g) + k (q − q_0) (nv,) [N m]; zero if the tensions balance the arm."""
         pose = self.posture
@@ -110,7 +107,7 @@ class Stiffness(Result):
             J = pose.segments.length_jacobian
         return frozen(F @ J - self.wrench @ pose.jacobian + pose.own_torque)
 
-    @quantity("joint stiffness")
+    @tabulated
     def margin(self) -> float:
         """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; if negative, the arm buckles.
 

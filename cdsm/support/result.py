@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput, need
+from cdsm.quantities import QUANTITIES, UNITS_OF_JOINTS
 from cdsm.status import Status
 from cdsm.support.files import as_path, write_file
 from cdsm.support.format import JointUnits, key, plain, span
@@ -26,19 +27,26 @@ _T = TypeVar("_T")
 
 AXES = ("x", "y", "z")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
+MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def unit(unit: str, *dims: str, name: str = "") -> Mapping[str, Any]:
     """Return the metadata of a field: ``field(metadata=unit("N", "cable"))``.
 
-    ``unit`` is an SI unit, "1" for a plain number, or "torque", "joint stiffness" or "joint" for a
-    unit that depends on whether joints turn or slide. ``dims`` name the axes of an array: "joint",
-    "cable", "held_cable" (position-controlled), "axis", "component", or any other; a field that is
-    called like its own and only dimension is the coordinate of this dimension. The dimension
-    "direction" is left out of a value for one direction. ``name`` replaces the field's in the
-    export.
+    ``unit`` is an SI unit, "1" for a plain number, or a key of
+    :data:`~cdsm.quantities.UNITS_OF_JOINTS`, which depends on whether joints turn or slide.
+    ``dims`` name the axes of an array: "joint", "cable", "held_cable" (position-controlled),
+    "axis", "component", or any other; a field that is called like its own and only dimension is
+    the coordinate of this dimension. The dimension "direction" is left out of a value for one
+    direction. ``name`` replaces the field's in the export.
     """
     return {"unit": unit, "dims": dims, "name": name}
+
+
+def unit_of(name: str) -> Mapping[str, Any]:
+    """Return the metadata of a field that is a quantity of :data:`~cdsm.quantities.QUANTITIES`."""
+    quantity = QUANTITIES[name]
+    return unit(quantity.unit, *quantity.dims, name=name)
 
 
 class _Quantity(cached_property[_T]):
@@ -56,6 +64,13 @@ def quantity(of: str, *dims: str) -> Callable[[Callable[[Any], _T]], cached_prop
         return made
 
     return decorate
+
+
+def tabulated(compute: Callable[[Any], _T]) -> cached_property[_T]:
+    """Make a cached property of a quantity of :data:`~cdsm.quantities.QUANTITIES`."""
+    made = _Quantity(compute)
+    made.metadata = unit_of(compute.__name__)
+    return made
 
 
 class Result(ReadOnlyState):
@@ -169,14 +184,13 @@ class Result(ReadOnlyState):
         """Return the units that depend on the joints of the arm."""
         if not self._arm:
             return {}
-        joined = JointUnits(self._arm.slides).joined
-        torque = joined("N m", "N")
-        stiffness = joined("N m/rad", "N/m")
-        return {"joint": joined("rad", "m"), "torque": torque, "joint stiffness": stiffness}
+        units = JointUnits(self._arm.slides)
+        return {unit: units.of(unit) for unit in UNITS_OF_JOINTS}
 
     def _labels(self) -> dict[str, Sequence[object]]:
         """Return the names along each dimension that has names."""
         labels: dict[str, Sequence[object]] = {"axis": AXES, "component": COMPONENTS}
+        labels |= {"axis_column": AXES, "motion": MOTIONS, "motion_column": MOTIONS}
         if self._arm:
             joints = self._arm.joint_names
             cables = self._arm.cables

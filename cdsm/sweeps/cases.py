@@ -13,7 +13,7 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.batch.evaluation import OUTPUTS, evaluate
+from cdsm.batch.evaluation import evaluate
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.measures.clearance import KINDS, distances
@@ -21,6 +21,7 @@ from cdsm.measures.indices import principal_stiffness, tension_factor
 from cdsm.measures.payload import largest_force
 from cdsm.measures.polytope import balanced, polytope_of
 from cdsm.posture import Posture
+from cdsm.quantities import names_of
 from cdsm.status import Status
 from cdsm.support.validation import flag, quantity
 from cdsm.support.values import Array
@@ -156,7 +157,7 @@ class Cases:
             arm,
             np.repeat(q, cases, axis=0),
             wrench=wrench,
-            outputs=[name for name in OUTPUTS if name in asked],
+            outputs=[name for name in names_of("batch") if name in asked],
             direction=self.direction if "along" in asked else None,
             minimum=low,
             maximum=high,

@@ -10,13 +10,14 @@ import pytest
 
 import cdsm
 from cdsm.batch import Batch
-from cdsm.batch.evaluation import OUTPUTS
-from cdsm.batch.quantities import OF_POSTURE
 from cdsm.presets import STRAND_1X19
+from cdsm.quantities import QUANTITIES, names_of
 from cdsm.support.values import Array
 from tests.support.arms import STEEL, mixed_arm, random_arm
 from tests.support.foreign import crab
 from tests.support.rough import rough
+
+OUTPUTS = names_of("batch")
 
 ROUNDING = 1e-12
 """Of the largest entry: other orders of summation, and what inverses make of them."""
@@ -204,7 +205,7 @@ def everything(arm: cdsm.Manipulator, q: Any, tension: Any = None, **more: Any) 
     return cdsm.evaluate(arm, q, tension, wrench, OUTPUTS, direction=DIRECTIONS, **more)
 
 
-POSED = set(OF_POSTURE)
+POSED = {name for name in names_of("batch") if QUANTITIES[name].needs == "posture"}
 PULLED = {*POSED, "residual", "active", "load", "tension"}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.batch.evaluation import OUTPUTS
+from cdsm.quantities import names_of
 from tests.support.arms import mixed_arm, random_posture
 
 POSE = random_posture(mixed_arm(), 3)
@@ -114,7 +114,7 @@ def test_results_become_strict_json_and_tables_with_units(name: str) -> None:
 
 def test_batch_has_one_row_for_each_posture_in_pandas_and_labels_in_xarray() -> None:
     q = np.array([POSE.q, 0.5 * POSE.q, 99.0 * POSE.q])
-    outputs = [name for name in OUTPUTS if name != "along"]
+    outputs = [name for name in names_of("batch") if name != "along"]
     batch = cdsm.evaluate(
         POSE.arm, q, minimum=10.0, outputs=[*outputs, "along"], direction=["z", "x"]
     )
