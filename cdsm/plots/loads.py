@@ -95,25 +95,28 @@ def plot_load_history(history: LoadHistory) -> Figure:
     figure, ((left, right),) = style.panels(style.TWO_COLUMNS, 3.0, 2)
     forces = np.vstack([history.reference_wrench, history.wrenches])[:, :3]
     moved = MM * np.vstack([np.zeros(3), history.displacement])
+    number = np.append(-1, history.load)  # −1: the reference
     size = np.linalg.norm(forces, axis=1)
     if size.any():
         u = forces[size.argmax()] / size.max()
         left.plot(moved @ u, forces @ u, "o-", markersize=2.0, linewidth=0.9)
         left.set(xlabel="displacement along the force [mm]", ylabel="force [N]")
     else:
-        left.plot(moved, "o-", markersize=2.0, linewidth=0.9, label=["x", "y", "z"])
-        left.set(xlabel="number of the load", ylabel="displacement of the tip [mm]")
+        left.plot(number, moved, "o-", markersize=2.0, linewidth=0.9, label=["x", "y", "z"])
+        left.set(xlabel="number of the load (−1: reference)", ylabel="displacement of the tip [mm]")
         left.legend()
     cable = int(np.argmax([np.ptp(T, axis=1).max() for T in history.tensions]))
     tensions = history.tensions[cable]
     F = history.reference_tension[cable]
     values = np.vstack([np.full(tensions.shape[1], F), tensions])
-    right.plot(values[:, 0], color=style.BLUE, linewidth=0.9, zorder=3, label="at the motor")
-    for line in right.plot(values[:, 1:-1], color="0.6", linewidth=0.9)[:1]:
+    right.plot(
+        number, values[:, 0], color=style.BLUE, linewidth=0.9, zorder=3, label="at the motor"
+    )
+    for line in right.plot(number, values[:, 1:-1], color="0.6", linewidth=0.9)[:1]:
         line.set_label("between")
-    right.plot(values[:, -1], color=style.VERMILLION, linewidth=0.9, label="at the end")
+    right.plot(number, values[:, -1], color=style.VERMILLION, linewidth=0.9, label="at the end")
     style.whole_numbers(right.xaxis)
-    right.set(xlabel="number of the load", ylabel="tension of each segment [N]")
+    right.set(xlabel="number of the load (−1: reference)", ylabel="tension of each segment [N]")
     right.legend(title=history.reference.arm.cables[cable].name, **style.BESIDE)
     lost = f"{1000.0 * history.dissipated.sum():.4g} mJ lost in all in"
     holes = plural(len(history.holes), "hole")

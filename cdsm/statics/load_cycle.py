@@ -31,14 +31,15 @@ _SHOWN = 24  # largest number of loads that are printed; of more, the first and 
 class LoadHistory(Result, Plotted):
     """States of an arm with friction, load by load; made by :func:`~cdsm.load_cycle`.
 
-    There are n loads. The S segments and P holes are in the order of :attr:`Posture.segments`. The
+    There are n loads. Their numbers count from 0, as the rows of all arrays do: ``pose(k)`` and
+    ``stiffness(k)`` belong to ``tip[k]``. The S segments and P holes are in the order of :attr:`Posture.segments`. The
     rest length of wire is its length at zero strain. All arrays are read-only.
 
     Attributes:
         reference: Posture at which the motors were locked.
         reference_tension: F (C,) [N] at the reference, the same in all segments of a cable.
         reference_wrench: W at the reference (6,): force [N], then moment [N m].
-        load: Number of each load (n,), from 1.
+        load: Number of each load (n,), from 0: its row in ``wrenches``.
         wrenches: W at each load (n, 6): force [N], then moment [N m].
         motors: Commands at each load (n, C): rest length [m] that a position-controlled motor has
             taken in since the reference, or the tension [N] of a force-controlled one.
@@ -86,7 +87,7 @@ class LoadHistory(Result, Plotted):
 
         All states after a snap-through can depend on the sub-steps.
         """
-        return tuple(f"SNAPS THROUGH at load {k + 1}" for k in np.flatnonzero(self.snaps).tolist())
+        return tuple(f"SNAPS THROUGH at load {k}" for k in np.flatnonzero(self.snaps).tolist())
 
     @cached_property
     def tensions(self) -> tuple[Array, ...]:
@@ -103,14 +104,14 @@ class LoadHistory(Result, Plotted):
         return tuple(f"{names[c]} site {site + 1}" for c, site in pairs)
 
     def pose(self, load: int) -> Posture:
-        """Return the posture at load number ``load``, from 0; a negative one counts from the end.
+        """Return the posture at a load, by its number in :attr:`load`; −1 is the last load.
 
         Raises InvalidInput if there is no such load.
         """
         return self.reference.arm.at(self.angles[self._index(load)], check_limits=False)
 
     def stiffness(self, load: int) -> Stiffness:
-        """Compute the tangent stiffness at load number ``load``, from 0; −1 is the last load.
+        """Compute the tangent stiffness at a load, by its number in :attr:`load`; −1: the last.
 
         It is valid while the cables continue to slide in the same holes and directions.
         """
@@ -135,7 +136,7 @@ class LoadHistory(Result, Plotted):
             moved = "".join(f"{1000.0 * x:>z10.4f}" for x in moves[k])
             slide = np.count_nonzero(self.sliding[k])
             lost = 1000.0 * self.dissipated[k]
-            rows.append(f"{k + 1:>5}  {force}{moved}{slide:>9}{lost:>12.4g}")
+            rows.append(f"{k:>5}  {force}{moved}{slide:>9}{lost:>12.4g}")
         lost = 1000.0 * self.dissipated.sum()
         rows.append(f"{self.sliding.shape[1]} holes; in all {lost:.4g} mJ lost in the holes")
         return "\n".join(rows)
@@ -189,7 +190,7 @@ def load_cycle(
         substeps: Number of equal steps between two loads, from 1 to 1000. A step is exact if no
             hole stops sliding within it. With 4, the tips of random arms are off by 1 % of the
             largest displacement at worst, half of them by less than 0.03 %; the dissipated work is
-            off by 0.3 % (median). All errors fall with the number.
+            off by 0.3 % (median). On average the errors fall as 1/``substeps``.
 
     Raises:
         InvalidInput: As for :func:`~cdsm.stiffness`; or the posture is beyond a joint limit; or
@@ -227,7 +228,7 @@ def load_cycle(
     pairs = tuple(zip(loads, commands, strict=True))
     for k, (wrench, command) in enumerate(show_progress(pairs, "loads")):
         goal = Load(wrench, none, command)
-        state, step = arm.step_to(state, goal, substeps, f"the step to load {k + 1}")
+        state, step = arm.step_to(state, goal, substeps, f"the step to load {k}")
         states.append(state)
         steps.append(step)
     hole = pose.segments.chains.hole
@@ -238,7 +239,7 @@ def load_cycle(
         reference=pose,
         reference_tension=F,
         reference_wrench=W,
-        load=frozen(np.arange(1, len(loads) + 1)),
+        load=frozen(np.arange(len(loads))),
         wrenches=frozen(loads),
         motors=frozen(commands),
         angles=frozen(np.array([each.pose.q for each in arms])),
@@ -271,7 +272,7 @@ def _commands(motors: ArrayLike, pose: Posture, shape: tuple[int, ...], wire: Ar
         k, c = np.argwhere(beyond)[0].tolist()
         raise InvalidInput(
             "motors",
-            f"{commands[k, c]:g} m of wire taken in for {cables.names[c]} at load {k + 1}; it has "
+            f"{commands[k, c]:g} m of wire taken in for {cables.names[c]} at load {k}; it has "
             f"only {wire[c]:.4g} m. Take in less.",
         )
     return commands

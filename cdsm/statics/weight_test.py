@@ -43,7 +43,7 @@ class WeightTest(Result, Plotted):
         states: Equilibrium at each step; the last one is under the full load.
         breakaway: Load in the direction of the weight below which no cable slides, and the hole
             that slides first; None for an arm without friction.
-        history: States with friction; entry 0 is the arm without the weight. None without friction.
+        history: States with friction; load 0 is the arm without the weight. None without friction.
     """
 
     _headline = "stiffness"
