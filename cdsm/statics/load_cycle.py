@@ -32,8 +32,9 @@ class LoadHistory(Result, Plotted):
     """States of an arm with friction, load by load; made by :func:`~cdsm.load_cycle`.
 
     There are n loads. Their numbers count from 0, as the rows of all arrays do: ``pose(k)`` and
-    ``stiffness(k)`` belong to ``tip[k]``. The S segments and P holes are in the order of :attr:`Posture.segments`. The
-    rest length of wire is its length at zero strain. All arrays are read-only.
+    ``stiffness(k)`` belong to ``tip[k]``. The S segments and P holes are in the order of
+    :attr:`Posture.segments`. The rest length of wire is its length at zero strain. All arrays are
+    read-only.
 
     Attributes:
         reference: Posture at which the motors were locked.
