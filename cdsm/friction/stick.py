@@ -212,7 +212,7 @@ class RestBand(Result):
     def warnings(self) -> tuple[str, ...]:
         """Sentences that say where first order misleads; empty if there are none."""
         said = () if self.stiffness.is_stable else self.stiffness.warnings[:1]
-        if self.half_width > _WIDE * self._posture.arm.length:
+        if self.half_width > _WIDE * self.stiffness.posture.arm.length:
             said += (
                 f"FAR TOO WIDE: ±{1e3 * self.half_width:.3g} mm is more than "
                 f"{100.0 * _WIDE:g} % of the arm's length; near buckling the tip rests closer.",
@@ -220,7 +220,7 @@ class RestBand(Result):
         return said
 
     def __str__(self) -> str:
-        rough = self._posture.segments.chains.friction.max(initial=0.0) > 0.1
+        rough = self.stiffness.posture.segments.chains.friction.max(initial=0.0) > 0.1
         said = (
             f"first-order band: the tip rests within ±{1e3 * self.half_width:.4g} mm along "
             f"{coordinates(self.direction)} of this posture, whatever loads came before; "

@@ -50,9 +50,9 @@ class StiffnessGradient(Result):
     @cached_property
     def joint(self) -> Array:
         """∂K_θ/∂F (C, nv, nv) [m/rad²]: one symmetric matrix per cable."""
-        J = self._posture.length_jacobian
+        J = self.stiffness.posture.length_jacobian
         slope = self.cable_stiffness[:, None, None]
-        return frozen(self._posture.length_hessian + slope * J[:, :, None] * J[:, None])
+        return frozen(self.stiffness.posture.length_hessian + slope * J[:, :, None] * J[:, None])
 
     @cached_property
     def margin(self) -> Array:
@@ -63,7 +63,7 @@ class StiffnessGradient(Result):
         upper bound of the change of λ_min, to first order.
         """
         v = self.stiffness.critical_direction[:, None]
-        return frozen(form_by_tension(self._posture, self.cable_stiffness, v, v)[:, 0, 0])
+        return frozen(form_by_tension(self.stiffness.posture, self.cable_stiffness, v, v)[:, 0, 0])
 
     @cached_property
     def cartesian(self) -> Array:
@@ -91,13 +91,13 @@ class StiffnessGradient(Result):
         K_θᵀ, which differs if a moment acts on the tip.
         """
         K = self.stiffness.joint
-        rows = U @ self._posture.jacobian[:3]
+        rows = U @ self.stiffness.posture.jacobian[:3]
         left = np.linalg.solve(K.T, rows.T) @ X.T
         right = np.linalg.solve(K, rows.T) @ X
-        return form_by_tension(self._posture, self.cable_stiffness, left, right)
+        return form_by_tension(self.stiffness.posture, self.cable_stiffness, left, right)
 
     def __str__(self) -> str:
-        arm = self._posture.arm
+        arm = self.stiffness.posture.arm
         smallest = f"smallest joint stiffness [{arm.stiffness_unit()}]"
         columns = (without_rounding(each) for each in (self.cable_stiffness / 1e3, self.margin))
         rows = [["cable", "cable stiffness [N/mm]", smallest]]

@@ -38,9 +38,9 @@ def _faults(report: Report) -> Iterator[str]:
         yield f"check not possible for {' and '.join(names)}: {reason}."
     if report.imbalance > checks.TOLERANCE:
         yield (
-            f"the tensions do not balance the arm: the residual is {report.residual:.3g} N m at "
-            f"{report.residual_joint}, {report.imbalance:.1e} of the torques; distribute_tension "
-            "finds tensions that do."
+            "the tensions do not balance the arm: the residual is "
+            f"{report.largest_residual:.3g} N m at {report.residual_joint}, "
+            f"{report.imbalance:.1e} of the torques; distribute_tension finds tensions that do."
         )
     if not K.is_stable:
         yield " ".join(map(str.strip, K.warnings))

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import InvalidInput
 from cdsm.friction.capstan import assemble_segments
+from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
 from cdsm.statics.quasi_static import Load, QuasiStaticArm
@@ -59,7 +60,6 @@ class LoadHistory(Result, Plotted):
 
     _headline = "dissipated"
     _rows = "load"
-    _posture_from = "reference"
     _figure = "plot_load_history"
 
     reference: Posture
@@ -76,6 +76,16 @@ class LoadHistory(Result, Plotted):
     stop_torque: Array = field(metadata=unit("torque", "load", "joint"))
     dissipated: Array = field(metadata=unit("J", "load"))
     snaps: NDArray[np.bool_] = field(metadata=unit("1", "load"))
+
+    @property
+    def arm(self) -> Manipulator:
+        """The arm."""
+        return self.reference.arm
+
+    @quantity("joint", "joint")
+    def reference_angles(self) -> Array:
+        """Joint coordinates at the reference (nv,) [rad]."""
+        return self.reference.q
 
     @quantity("m", "load", "axis")
     def displacement(self) -> Array:

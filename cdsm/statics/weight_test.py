@@ -141,7 +141,7 @@ class WeightTest(Result, Plotted):
     @property
     def left_reference(self) -> bool:
         """Whether the given tensions did not balance the arm, so that it moved before the test."""
-        return self.unloaded.moved > _DISPLACED * self._posture.arm.length
+        return self.unloaded.moved > _DISPLACED * self.unloaded.pose.arm.length
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -168,7 +168,7 @@ class WeightTest(Result, Plotted):
         moves = without_rounding(np.vstack([self.displacements, self.tangent_displacement]))
         for name, moved in zip(names, moves, strict=True):
             rows.append(f"{name:>10}" + "".join(f"{1e3 * x:>12.4g}" for x in moved))
-        model = frictionless_model(self._posture.arm)
+        model = frictionless_model(self.unloaded.pose.arm)
         rows += [
             f"stiffness along the force: measured {self.stiffness / 1e3:.4g} N/mm, "
             f"linear {self.tangent / 1e3:.4g} N/mm",
@@ -181,7 +181,7 @@ class WeightTest(Result, Plotted):
 
     def _secant(self, displacement: Array) -> float:
         moved = float(displacement @ unit_direction("force", self.force))
-        measured = abs(moved) > _MEASURED * self._posture.arm.length
+        measured = abs(moved) > _MEASURED * self.unloaded.pose.arm.length
         return float(np.linalg.norm(self.force)) / moved if measured else math.inf
 
     def _about_friction(self) -> list[str]:

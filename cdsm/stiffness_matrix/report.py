@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field
 from io import StringIO
 from typing import TYPE_CHECKING, Literal, final
 
-from cdsm.support.format import plain
+from cdsm.support.format import merged, plain
 from cdsm.support.result import Result, unit
 
 if TYPE_CHECKING:
@@ -54,10 +54,10 @@ class Report(Result):
     Attributes:
         stiffness: The stiffness that was checked.
         comparisons: Terms of K_θ and torques against finite differences and the batch.
-        residual: Largest residual |J_Lᵀ F + g − J_Xᵀ W| of Eq. 13 [N m]; the force at a prismatic
-            joint is multiplied by the arm's length.
+        largest_residual: Largest residual |J_Lᵀ F + g − J_Xᵀ W| of Eq. 13 [N m]; the force at a
+            prismatic joint is multiplied by the arm's length.
         residual_joint: Name of the joint with the largest residual.
-        imbalance: ``residual`` per torque of cables, weight and load [-].
+        imbalance: ``largest_residual`` per torque of cables, weight and load [-].
         bound_violation: Violation of the bounds of distributed tensions per largest tension [-];
             None for tensions that were given.
         kkt_residual: min ‖F + J_L λ − μ + ν‖/‖F‖ [-] of Eq. 17 over the multipliers λ of the
@@ -67,11 +67,9 @@ class Report(Result):
         notes: Notes on how to read the stiffness, one text each, e.g. that a cable is slack.
     """
 
-    _posture_from = "stiffness.posture"
-
     stiffness: Stiffness
     comparisons: tuple[Comparison, ...]
-    residual: float = field(metadata=unit("N m"))
+    largest_residual: float = field(metadata=unit("N m"))
     residual_joint: str = field(metadata=unit("1"))
     imbalance: float = field(metadata=unit("1"))
     bound_violation: float | None = field(metadata=unit("1"))
@@ -87,16 +85,17 @@ class Report(Result):
 
     def to_dict(self) -> dict[str, object]:
         """Return the report and :meth:`Stiffness.to_dict` in SI for JSON, units in the keys."""
-        said = {"passed": self.passed, "faults": self.faults, "notes": self.notes}
-        checked = {"comparisons": [asdict(each) for each in self.comparisons]}
-        return self.stiffness.to_dict() | plain(said | checked) | super().to_dict()
+        verdict = {"passed": self.passed, "faults": self.faults, "notes": self.notes}
+        comparisons = {"comparisons": [asdict(comparison) for comparison in self.comparisons]}
+        parts = plain(verdict), plain(comparisons), super().to_dict()
+        return merged(self.stiffness.to_dict(), *parts)
 
     def to_html(self, about: str = "") -> str:
         """Return the report as a self-contained HTML page; ``about`` is text below the title."""
         return _printed(self, about).export_html()
 
     def __repr__(self) -> str:
-        name = self._posture.arm.name
+        name = self.stiffness.posture.arm.name
         return f"<Report on the stiffness of {name}: {'PASS' if self.passed else 'FAIL'}>"
 
     def __str__(self) -> str:
@@ -111,7 +110,7 @@ def _printed(report: Report, about: str = "") -> Console:
     console = Console(
         record=True, file=StringIO(), width=100, markup=False, emoji=False, highlight=False
     )
-    console.print(f"Stiffness check: {report._posture.arm.name}", style="bold")
+    console.print(f"Stiffness check: {report.stiffness.posture.arm.name}", style="bold")
     if about:
         console.print(about)
     good = "PASS: agrees with finite differences, tensions balance the arm, arm is stable."
@@ -132,7 +131,7 @@ def _printed(report: Report, about: str = "") -> Console:
         console.print()
     said = "K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle. F is tension, the cables' "
     console.print(f"{said}torque −J_Lᵀ F, the wrench W a dead load; readings are in base axes.")
-    if (arm := report._posture.arm).slides.any():
+    if (arm := report.stiffness.posture.arm).slides.any():
         console.print(f"Sliding joints count with the arm's length, {arm.length:.4g} m, as lever.")
     return console
 
@@ -151,7 +150,7 @@ def _tables(report: Report) -> Iterator[tuple[tuple[str, ...], ...]]:
     )
     yield (
         ("balance, optimality, stability", ""),
-        ("residual of Eq. 13", f"{report.residual:.1e} N m at {report.residual_joint}"),
+        ("residual of Eq. 13", f"{report.largest_residual:.1e} N m at {report.residual_joint}"),
         ("residual per torque", f"{report.imbalance:.1e}"),
         ("violation of bounds", violation),
         ("KKT residual (recomputed multipliers)", kkt),

@@ -64,7 +64,16 @@ def without_rounding(values: Array) -> Array:
 
 def plain(numbers: Mapping[str, Any]) -> dict[str, object]:
     """Prepare values for JSON: arrays become lists, results dictionaries, inf and NaN None."""
-    return {name: _plain(each) for name, each in numbers.items()}
+    return {name: _plain(value) for name, value in numbers.items()}
+
+
+def merged(*parts: Mapping[str, object]) -> dict[str, object]:
+    """Return the entries of all parts; no part may overwrite another one's."""
+    entries: dict[str, object] = {}
+    for part in parts:
+        assert not (both := entries.keys() & part.keys()), f"two numbers are called {both}"
+        entries |= part
+    return entries
 
 
 def _plain(value: Any) -> Any:
@@ -77,7 +86,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return _plain(value.tolist())
     if isinstance(value, (list, tuple)):
-        return [_plain(each) for each in value]
+        return [_plain(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

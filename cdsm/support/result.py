@@ -1,4 +1,4 @@
-"""Base class of results: unit and dimensions of each number stand once, beside its field."""
+"""Base class of results: the unit and the dimensions of each number are metadata of its field."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import InvalidInput, need
+from cdsm.errors import CdsmError, InvalidInput, need
 from cdsm.quantities import QUANTITIES, UNITS_OF_JOINTS
 from cdsm.status import Status
 from cdsm.support.files import as_path, write_file
-from cdsm.support.format import JointUnits, key, plain, span
-from cdsm.support.values import ReadOnlyState
+from cdsm.support.format import JointUnits, key, merged, plain, span
+from cdsm.support.values import Array, ReadOnlyState
 
 if TYPE_CHECKING:
     import pandas
@@ -49,35 +49,63 @@ def unit_of(name: str) -> Mapping[str, Any]:
     return unit(quantity.unit, *quantity.dims, name=name)
 
 
+class ArmOfResult(Protocol):
+    """What a result asks of its arm: names and units of its joints, and its cables."""
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints."""
+
+    @property
+    def slides(self) -> NDArray[np.bool_]:
+        """Whether each joint is prismatic (nv,)."""
+
+    @property
+    def cables(self) -> Any:
+        """The cables, which have names."""
+
+
+class PostureOfResult(Protocol):
+    """What a result asks of its posture: the arm and the joint coordinates (nv,)."""
+
+    @property
+    def arm(self) -> ArmOfResult:
+        """The arm."""
+
+    @property
+    def q(self) -> Array:
+        """Joint coordinates (nv,) [rad]; [m] of prismatic joints."""
+
+
 class _Quantity(cached_property[_T]):
     """A cached property with the metadata of a field."""
 
     metadata: Mapping[str, Any]
 
 
-def quantity(of: str, *dims: str) -> Callable[[Callable[[Any], _T]], cached_property[_T]]:
+def quantity(unit_name: str, *dims: str) -> Callable[[Callable[[Any], _T]], cached_property[_T]]:
     """Make a cached property that is printed and exported like a field with :func:`unit`."""
 
     def decorate(compute: Callable[[Any], _T]) -> cached_property[_T]:
-        made = _Quantity(compute)
-        made.metadata = unit(of, *dims)
-        return made
+        cached = _Quantity(compute)
+        cached.metadata = unit(unit_name, *dims)
+        return cached
 
     return decorate
 
 
 def tabulated(compute: Callable[[Any], _T]) -> cached_property[_T]:
     """Make a cached property of a quantity of :data:`~cdsm.quantities.QUANTITIES`."""
-    made = _Quantity(compute)
-    made.metadata = unit_of(compute.__name__)
-    return made
+    cached = _Quantity(compute)
+    cached.metadata = unit_of(compute.__name__)
+    return cached
 
 
 class Result(ReadOnlyState):
-    """A frozen result that exports itself: what a field is, stands in its metadata.
+    """A frozen result that exports the numbers of fields and properties that have metadata.
 
-    Fields and properties without metadata are not exported. Subclasses write ``__str__`` by
-    hand, nothing else; those with a figure are also :class:`~cdsm.support.values.Plotted`.
+    Subclasses write ``__str__`` by hand, nothing else; those with a figure are also
+    :class:`~cdsm.support.values.Plotted`.
     """
 
     _headline: ClassVar[str] = ""
@@ -93,43 +121,47 @@ class Result(ReadOnlyState):
     """
 
     @property
-    def _posture(self) -> Any:
-        found: Any = self
+    def _posture(self) -> PostureOfResult | None:
+        value: Any = self
         for name in self._posture_from.split("."):
-            found = getattr(found, name, None)
-        return found
+            value = getattr(value, name, None)
+        posture: PostureOfResult | None = value
+        return posture
 
     @property
-    def _arm(self) -> Any:
+    def _arm(self) -> ArmOfResult | None:
         return self._posture.arm if self._posture else getattr(self, "arm", None)
 
     def to_dict(self) -> dict[str, object]:
         """Return all numbers in SI for JSON, with the unit in the keys; inf and NaN are None."""
         labels = self._labels()
-        found = dict(self._posture._coordinates) if self._posture else {}
-        for name, value, of, dims in self._quantities():
+        numbers: dict[str, object] = {}
+        if pose := self._posture:
+            numbers = JointUnits(pose.arm.slides).to_dict(pose.arm.joint_names, pose.q)
+        for name, value, unit_name, dims in self._quantities():
             named = bool(dims) and set(dims) <= {"joint", "cable"}
-            found[key(name, of)] = _by_name(value, dims, labels) if named else value
-        return plain(found)
+            entry = _by_name(value, dims, labels) if named else value
+            numbers = merged(numbers, {key(name, unit_name): entry})
+        return plain(numbers)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return all numbers as a labelled Dataset in SI; needs xarray (CdsmError)."""
         variables = {}
         words = {}
-        for name, value, of, dims in self._quantities():
+        for name, value, unit_name, dims in self._quantities():
             array = _array(value)
             if array.dtype.kind in "USO" or array.ndim != len(dims):
                 words[name] = str(value)
             else:
-                variables[name] = (dims, array, of)
+                variables[name] = (dims, array, unit_name)
         return dataset(variables, self._labels(), **words)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with a unit in the name of each column; needs pandas (CdsmError)."""
         labels: dict[str, Any] = self._labels()
         columns: dict[str, Any] = {}
-        for name, value, of, dims in self._quantities():
-            suffix = "" if of == "1" else f" [{of}]"
+        for name, value, unit_name, dims in self._quantities():
+            suffix = "" if unit_name == "1" else f" [{unit_name}]"
             if not self._rows and not dims:
                 columns[name + suffix] = [value]
             elif dims == (name,) == (self._rows,):
@@ -139,10 +171,10 @@ class Result(ReadOnlyState):
                 for place in np.ndindex(array.shape[1:]):
                     pairs = zip(dims[1:], place, strict=True)
                     parts = [str(labels[d][i] if d in labels else i + 1) for d, i in pairs]
-                    own = suffix
-                    if of == "rad or m":  # each joint has one of them
-                        own = f" [{JointUnits(self._arm.slides).joined('rad', 'm', place[-1])}]"
-                    columns[" ".join([name, *parts]) + own] = array[(slice(None), *place)]
+                    end = suffix
+                    if self._arm and unit_name == "rad or m":  # each joint has one of them
+                        end = f" [{JointUnits(self._arm.slides).joined('rad', 'm', place[-1])}]"
+                    columns[" ".join([name, *parts]) + end] = array[(slice(None), *place)]
         numbers = np.arange(len(next(iter(columns.values()), ())))  # of rows without names
         return data_frame(columns, self._rows or "result", labels.get(self._rows, numbers))
 
@@ -157,28 +189,45 @@ class Result(ReadOnlyState):
         return write_labelled(path, self.to_pandas, self.to_xarray)
 
     def __repr__(self) -> str:
-        shown = "" if getattr(self, "is_stable", True) else ", UNSTABLE"
-        for name, value, of, _ in self._quantities():
+        state = "" if getattr(self, "is_stable", True) else ", UNSTABLE"
+        return f"<{type(self).__name__}{self._headline_text()}{state}>"
+
+    def _headline_text(self) -> str:
+        """Return name, value and unit of the headline; nothing else is computed."""
+        for attribute, metadata in self._metadata().items():
+            name = metadata["name"] or attribute
             if name == self._headline:
+                try:
+                    value = getattr(self, attribute)
+                except CdsmError:  # it does not exist here
+                    return ""
                 numbers = span(np.atleast_1d(value)) if np.size(value) else "none"
-                shown = f" {name} {numbers} {'' if of == '1' else of}".rstrip() + shown
-        return f"<{type(self).__name__}{shown}>"
+                unit_name = self._units().get(metadata["unit"], metadata["unit"])
+                return f" {name} {numbers} {'' if unit_name == '1' else unit_name}".rstrip()
+        return ""
+
+    def _metadata(self) -> dict[str, Mapping[str, Any]]:
+        """Return the metadata of each number by attribute: fields first, then properties."""
+        metadata: dict[str, Mapping[str, Any]] = {
+            field.name: field.metadata
+            for field in fields(self)  # type: ignore[arg-type]
+            if field.metadata
+        }
+        for kind in type(self).__mro__:
+            metadata |= {n: p.metadata for n, p in vars(kind).items() if isinstance(p, _Quantity)}
+        return metadata
 
     def _quantities(self) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
-        """Yield name, value, unit and dimensions of each number: fields first, then properties."""
-        told: dict[str, Mapping[str, Any]]
-        told = {each.name: each.metadata for each in fields(self) if each.metadata}  # type: ignore[arg-type]
-        for kind in type(self).__mro__:
-            told |= {n: p.metadata for n, p in vars(kind).items() if isinstance(p, _Quantity)}
+        """Yield name, value, unit and dimensions of each number."""
         units = self._units()
-        for name, metadata in told.items():
-            of = metadata["unit"]
-            value = getattr(self, name)
+        for attribute, metadata in self._metadata().items():
+            value = getattr(self, attribute)
             value = value.word if isinstance(value, Status) else value
             dims = metadata["dims"]
             if "direction" in dims and np.ndim(value) < len(dims):
                 dims = tuple(dim for dim in dims if dim != "direction")
-            yield metadata["name"] or name, value, units.get(of, of), dims
+            unit_name = units.get(metadata["unit"], metadata["unit"])
+            yield metadata["name"] or attribute, value, unit_name, dims
 
     def _units(self) -> dict[str, str]:
         """Return the units that depend on the joints of the arm."""
@@ -195,7 +244,7 @@ class Result(ReadOnlyState):
             joints = self._arm.joint_names
             cables = self._arm.cables
             labels |= {"joint": joints, "joint_column": joints, "cable": cables.names}
-            labels["held_cable"] = [each.name for each in cables if each.control == "position"]
+            labels["held_cable"] = [cable.name for cable in cables if cable.control == "position"]
         return labels
 
 
@@ -209,7 +258,7 @@ def _by_name(value: Any, dims: Sequence[str], labels: Mapping[str, Sequence[obje
     if not dims:
         return value
     pairs = zip(labels[dims[0]], np.asarray(value), strict=True)
-    return {label: _by_name(each, dims[1:], labels) for label, each in pairs}
+    return {label: _by_name(entry, dims[1:], labels) for label, entry in pairs}
 
 
 def data_frame(
