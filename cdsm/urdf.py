@@ -127,31 +127,47 @@ def backbone_radius(geometry: Geometry, body: Body) -> float:
     return 0.2 * geometry.hole_radii[max(body.joint - 1, 0)]
 
 
+def placeholder_of(geometry: Geometry, body: Body) -> tuple[float, float]:
+    """Return mass [kg] and moment of inertia [kg m²] that simulators need and a body lacks.
+
+    Both are zero for a body that has a mass and moments of its own.
+    """
+    if body.kind == "cross":
+        return CROSS_MASS, CROSS_INERTIA
+    beam = body.kind == "beam"
+    if not body.mass:
+        return (BEAM_MASS, BEAM_INERTIA) if beam else (CROSS_MASS, CROSS_INERTIA)
+    thin = beam and min(_moments(geometry, body)) < BEAM_INERTIA
+    return 0.0, BEAM_INERTIA if thin else 0.0
+
+
+def _moments(geometry: Geometry, body: Body) -> list[float]:
+    """Return the moments of inertia (3,) [kg m²] of a solid cylinder, about x, y and z."""
+    hole_radius = geometry.hole_radii[max(body.joint - 1, 0)]
+    radius = backbone_radius(geometry, body) if body.kind == "beam" else hole_radius
+    lateral = body.mass * (3.0 * radius**2 + body.length**2) / 12.0
+    return [body.mass * radius**2 / 2.0, lateral, lateral]
+
+
 def _body(geometry: Geometry, body: Body) -> etree._Element:
     """Build the link element of a body: its inertia, backbone and disks."""
     index = max(body.joint - 1, 0)
     radius = geometry.hole_radii[index]
-    slim = backbone_radius(geometry, body)
     length = body.length
-    mass = body.mass
+    mass, inertia = placeholder_of(geometry, body)
     if body.kind == "cross":
         shape = E.visual(E.geometry(E.sphere(radius=0.25 * radius)), E.material(name="backbone"))
-        return E.link(inertial(CROSS_MASS, CROSS_INERTIA * np.eye(3)), shape, name=body.name)
+        return E.link(inertial(mass, inertia * np.eye(3)), shape, name=body.name)
     thickness = 0.2 * geometry.joints[index].disk_offset
     disks = [disk for disk in geometry.disks if disk.link == body.name]
     parts = [_cylinder("disk", disk.x, disk.radius, thickness) for disk in disks]
     if length > 0.0:
+        slim = backbone_radius(geometry, body)
         parts.insert(0, _cylinder("backbone", length / 2, slim, length))
     if body.name == "base_disk":
         return E.link(*parts, name=body.name)
-    beam = body.kind == "beam"
-    round_radius = slim if beam else radius
-    lateral = mass * (3.0 * round_radius**2 + length**2) / 12.0
-    least = (BEAM_MASS, BEAM_INERTIA) if beam else (CROSS_MASS, CROSS_INERTIA)
-    moments = [mass * round_radius**2 / 2.0, lateral, lateral] if mass else [least[1]] * 3
-    if beam:
-        moments = [max(each, least[1]) for each in moments]
-    parts.insert(0, inertial(mass or least[0], np.diag(moments), *_at(length / 2)))
+    moments = [max(moment, inertia) for moment in _moments(geometry, body)]
+    parts.insert(0, inertial(body.mass or mass, np.diag(moments), *_at(length / 2)))
     return E.link(*parts, name=body.name)
 
 

@@ -19,9 +19,9 @@ from cdsm.support.format import aligned
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import instance
 from cdsm.support.values import Array, Plotted, frozen
-from cdsm.urdf import CROSS_INERTIA
+from cdsm.urdf import placeholder_of
 
-_LIGHT = 50.0  # a link below so many times the placeholders of its cross counts as massless
+_LIGHT = 50.0  # a joint that moves less than so many times the placeholders moves no mass
 
 
 @final
@@ -87,24 +87,15 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
 
     Raises:
         InvalidInput: ``stiffness`` belongs to another posture or arm.
-        SingularStiffness: A joint moves no mass, or hardly more than the placeholder in the
-            cross of its universal joint.
+        SingularStiffness: A joint moves no mass, or hardly more than the placeholders of crosses
+            and massless links.
     """
     arm = instance("pose", pose, Posture).arm
     if not instance("stiffness", stiffness, Stiffness).posture.equals(pose):
         raise InvalidInput("stiffness", "belongs to another posture or arm; compute it for this.")
     M = arm.body.mass_matrix(pose.q)
     if arm.is_serpentine:
-        least = int(M.diagonal().argmin())  # crosses and massless links have placeholders
-        crossed = any(len(joint.axes) == 2 for joint in arm.geometry.joints)
-        held = crossed or arm.geometry.links[-1].mass == 0.0
-        if held and M[least, least] < _LIGHT * CROSS_INERTIA:
-            raise SingularStiffness(
-                f"{arm.joint_names[least]} moves links of no mass, or of hardly any: its frequency "
-                "would be that of placeholders. Give the links their link_mass, or a backbone its "
-                "mass_per_length or disk_mass.",
-                frozen(np.eye(arm.nv)[least]),
-            )
+        _require_mass(pose, M)
     squares, shapes = vibrations(stiffness, M)
     shapes *= np.sign(shapes[abs(shapes).argmax(axis=0), np.arange(arm.nv)])
     vibrates = squares > 0.0
@@ -116,6 +107,39 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
         growth_rates=frozen(np.sqrt(-squares[~vibrates])),
         growth_shapes=frozen(shapes[:, ~vibrates]),
     )
+
+
+def _require_mass(pose: Posture, M: Array) -> None:
+    """Raise SingularStiffness if the mass that a joint moves is that of placeholders."""
+    arm = pose.arm
+    light = M.diagonal() < _LIGHT * _placeholder_matrix(pose).diagonal()
+    joint = int(np.where(light, M.diagonal(), math.inf).argmin())
+    if light[joint]:
+        raise SingularStiffness(
+            f"{arm.joint_names[joint]} moves links of no mass, or of hardly any: its frequency "
+            "would be that of placeholders. Give the links their link_mass, or a backbone its "
+            "mass_per_length or disk_mass.",
+            frozen(np.eye(arm.nv)[joint]),
+        )
+
+
+def _placeholder_matrix(pose: Posture) -> Array:
+    """Compute the mass matrix (nv, nv) [kg m²] of the placeholders in the URDF of an arm."""
+    body = pose.arm.body
+    geometry = pose.arm.geometry
+    chain = geometry.chain
+    placements = body.link_placements(pose.q)
+    linear, angular = np.split(body.state(pose.q).twist, 2)
+    columns = [body.all_joints.index(axis.name) for axis in chain.axes]
+    M = np.zeros((linear.shape[1], linear.shape[1]))
+    for moved_by, link in enumerate(chain.bodies):  # the joints before a link move it
+        mass, inertia = placeholder_of(geometry, link)
+        centre = placements[link.name] @ [link.length / 2.0, 0.0, 0.0, 1.0]
+        moving = columns[:moved_by]
+        turning = angular[:, moving]
+        velocity = linear[:, moving] + np.cross(turning, centre[:3], axis=0)
+        M[np.ix_(moving, moving)] += mass * velocity.T @ velocity + inertia * turning.T @ turning
+    return body.coupling.square(M) if body.coupling else M
 
 
 def vibrations(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:

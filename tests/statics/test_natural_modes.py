@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.statics.modes import _placeholder_matrix
 from cdsm.support.values import Array
 from tests.support.arms import (
     STEEL,
@@ -168,14 +169,51 @@ def test_motion_without_mass_is_an_error_that_names_the_joint(arm: cdsm.Manipula
     assert worst.startswith("joint3")
 
 
-def test_a_rod_without_disks_of_mass_swings_as_a_cantilever() -> None:
-    """1.8751² √(EI/(ρA L⁴))/2π; the pieces of the model are 0.6 % too slow."""
-    section = {"length": 0.12, "disks": 4, "hole_radius": 0.01, "hole_angles": [0.0, 2.1, 4.2]}
+def backbone(length: float, disks: int, EI: float, density: float) -> cdsm.Manipulator:
+    section = {"length": length, "disks": disks, "hole_radius": 0.01, "hole_angles": [0, 2, 4]}
     geometry = cdsm.Geometry.backbone(
-        sections=[section], bending_stiffness=0.03, mass_per_length=2.0
+        sections=[section], bending_stiffness=EI, mass_per_length=density
     )
-    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e4), gravity=(0.0, 0.0, 0.0))
-    rest = cdsm.forward_statics(arm, tension=[0.0, 0.0, 0.0])
-    expected = 1.8751**2 * np.sqrt(0.03 / (2.0 * 0.12**4)) / (2.0 * np.pi)
+    return cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e4), gravity=(0.0, 0.0, 0.0))
+
+
+NITINOL = {  # E, inner and outer diameter, density of the preset
+    "EI": 83e9 * math.pi / 64.0 * (1.22e-3**4 - 0.954e-3**4),
+    "density": 6450.0 * math.pi / 4.0 * (1.22e-3**2 - 0.954e-3**2),
+}
+
+
+@pytest.mark.parametrize(
+    ("arm", "length", "EI", "density", "frequency"),
+    [
+        (backbone(0.12, 4, 0.03, 2.0), 0.12, 0.03, 2.0, 4.759),
+        (backbone(0.25, 10, 0.02, 2.9e-3), 0.25, 0.02, 2.9e-3, 23.5),
+        (cdsm.presets.nitinol_segment(), 0.25, *NITINOL.values(), 12.4),
+    ],
+    ids=["thick", "thin", "Nitinol"],
+)
+def test_a_rod_without_disks_of_mass_swings_as_a_cantilever(
+    arm: cdsm.Manipulator, length: float, EI: float, density: float, frequency: float
+) -> None:
+    """1.8751² √(EI/(ρA L⁴))/2π of a slender beam; the pieces of the model are too slow."""
+    rest = cdsm.forward_statics(arm, tension=np.zeros(len(arm.cables)))
+    expected = 1.8751**2 * np.sqrt(EI / (density * length**4)) / (2.0 * np.pi)
+    assert expected == pytest.approx(frequency, rel=5e-3)
     found = cdsm.modes(rest.pose, rest.stiffness).frequencies[0]
     assert found == pytest.approx(expected, rel=0.01)
+
+
+def test_a_rod_without_mass_is_refused() -> None:
+    arm = backbone(0.12, 4, 0.03, 0.0)
+    rest = cdsm.forward_statics(arm, tension=np.zeros(3))
+    with pytest.raises(cdsm.SingularStiffness, match=r"no mass.*mass_per_length"):
+        cdsm.modes(rest.pose, rest.stiffness)
+
+
+@pytest.mark.parametrize("joints", ["universal", "hinged"])
+def test_placeholders_are_the_mass_of_an_arm_without_mass(joints: str) -> None:
+    geometry = random_arm(3, 4, joints).geometry
+    links = tuple(replace(link, mass=0.0) for link in geometry.links)
+    pose = random_posture(cdsm.Manipulator(geometry.replace(links=links), STEEL), 1)
+    M = pose.arm.body.mass_matrix(pose.q)
+    np.testing.assert_allclose(_placeholder_matrix(pose), M, rtol=0.0, atol=1e-12 * abs(M).max())
