@@ -129,8 +129,7 @@ def identify(
             start[at] = (low + high) / 2.0
     found = cdsm.identify(model_of, read, bounds, start=start)
     write_picture(figure, found.plot)
-    warnings = [f"warning: {sentence}" for sentence in found.warnings]
-    return answer(as_json, found.to_dict(), found, warnings=warnings)
+    return answer(as_json, found.to_dict(), found, warnings=found.warnings)
 
 
 def _ranges(free: list[str]) -> dict[str, Range | None]:

@@ -13,7 +13,7 @@ from cdsm.control.laws import (
     mixed,
     tension_control,
 )
-from cdsm.control.plants import Plant as Plant
+from cdsm.control.plants import Plant, PlantState
 from cdsm.control.run import TrackingRun
 from cdsm.control.sensing import Measurement, with_rigidity
 
@@ -22,6 +22,8 @@ __all__ = [
     "ControlInput",
     "Law",
     "Measurement",
+    "Plant",
+    "PlantState",
     "Reference",
     "TrackingRun",
     "feedforward",

@@ -224,7 +224,7 @@ class Identification(Result, Plotted):
         model = f"({frictionless_model(self.arm)}; secant where a force is given; "
         model += "loops with friction; tips at rest)"
         shown = [*aligned(lines), note, "", *aligned(tests), model, "", self._verdict]
-        return "\n".join([*shown, *(f"warning: {sentence}" for sentence in self.warnings)])
+        return "\n".join([*shown, *self.warnings])
 
     @property
     def reading_names(self) -> list[str]:

@@ -335,6 +335,8 @@ def test_identify(tmp_path: Path) -> None:
     for name, value, std in rows:
         assert abs(value - true[name]) < 2.0 * std
         assert value == pytest.approx(true[name], rel=0.05)
+    bounded = told(*asked, "--free", "rigidity=0.5:0.9", code=3)["warnings"]
+    assert any(sentence.startswith("rigidity is at its upper bound, 0.9") for sentence in bounded)
     assert sum(told(*asked, "--tests", 1)["counts"]) == 1
     assert "give bounds, spring=LOW:HIGH" in call(*asked, "--free", "spring").stderr
     assert "slack changes no weight test" in call(*asked, "--free", "slack=0:1").stderr
