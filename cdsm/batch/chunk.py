@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from cdsm.batch.quantities import READINGS, TERMS, Codes, read
 from cdsm.batch.rows import Body, Indices, Pose, one_by_one, rows_of, side_by_side
-from cdsm.errors import CdsmError
 from cdsm.manipulator import LIMIT_SLACK
 from cdsm.quantities import QUANTITIES
 from cdsm.routing import SHORTEST_SEGMENT
 from cdsm.status import Status
 from cdsm.support.values import Array, frozen
-from cdsm.tension.infeasibility import is_infeasible, is_proved_infeasible
-from cdsm.tension.solvers import DEFAULT_SOLVER, Problem, nondimensional, solve
+from cdsm.tension.least_tensions import least_tensions
+from cdsm.tension.solvers import DEFAULT_SOLVER, nondimensional
 
 if TYPE_CHECKING:
     from cdsm.batch.solution import Rows
@@ -137,7 +136,11 @@ class Chunk:
         for n in np.flatnonzero(~self._alone(good) & (status == Status.OK)):
             b, w = divmod(int(n), self._width)
             row = at.jacobian[b, ..., w], at.torque[b, :, w], low[b, :, w], high[b, :, w]
-            F[b, :, w], status[n] = _least(nondimensional(*row, rows.arm.length))
+            problem = nondimensional(*row, rows.arm.length)
+            # most rows for which the kernel has no guess are infeasible
+            solution = least_tensions(problem, DEFAULT_SOLVER, proof_first=True)
+            F[b, :, w] = problem.force * (solution.x if solution.ok else problem.low)
+            status[n] = solution.status
         return F
 
     def _of_stiffness(self, full: Pose, at: Pose, F: Array, k: Array, W: Array) -> dict[str, Array]:
@@ -253,17 +256,3 @@ class Chunk:
         """Return J_X (n, 6, nv)."""
         J = self._alone(at.tip_jacobian).swapaxes(2, 3)
         return np.ascontiguousarray(J).reshape(len(J), 6, -1)
-
-
-def _least(problem: Problem) -> tuple[Array, Status]:
-    """Return the least tensions F (C,) [N] and OK, or the reason why there are none."""
-    try:
-        if is_proved_infeasible(problem):  # most rows for which the kernel has no guess
-            return problem.low * problem.force, Status.INFEASIBLE
-        x = solve(problem, DEFAULT_SOLVER)
-        if not isinstance(x, str):
-            return x * problem.force, Status.OK
-        failed = Status.INFEASIBLE if is_infeasible(problem) else Status.SOLVER_FAILED
-    except CdsmError:  # a solver broke down
-        failed = Status.SOLVER_FAILED
-    return problem.low * problem.force, failed

@@ -9,7 +9,7 @@ from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.validation import instance
 from cdsm.support.values import Array
-from cdsm.tension.solvers import OPTIMAL, least
+from cdsm.tension.solvers import minimise
 
 _CLOSED = 1e-9  # smaller ratios are rounding of the linear program
 
@@ -26,7 +26,7 @@ def tension_factor(pose: Posture) -> float:
     count, nv = J.shape
     if np.linalg.matrix_rank(J) < nv:
         return 0.0
-    found = least(  # variables: F, then its least entry
+    solution = minimise(  # variables: F, then its least entry
         np.append(np.zeros(count), -1.0),
         A_eq=np.column_stack([J.T / abs(J).max(), np.zeros(nv)]),
         b_eq=np.zeros(nv),
@@ -34,9 +34,9 @@ def tension_factor(pose: Posture) -> float:
         b_ub=np.zeros(count),
         bounds=(0.0, 1.0),
     )
-    if found.status != OPTIMAL:
-        raise solver_failed("highs", f"finds no tension factor: {found.message}")
-    ratio = float(found.x[-1])
+    if not solution.ok:
+        raise solver_failed("highs", f"finds no tension factor: {solution.message}")
+    ratio = float(solution.x[-1])
     return ratio if ratio > _CLOSED else 0.0
 
 

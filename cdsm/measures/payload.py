@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.measures.polytope import Farthest, balanced, force_polytope
 from cdsm.posture import Posture
+from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
@@ -137,5 +138,7 @@ def payload(
 
 def largest_force(farthest: Farthest) -> float:
     """Return the largest force [N] along the one direction of ``farthest``; 0 if there is none."""
-    found = farthest(np.ones(1))
-    return 0.0 if found is None else max(found[0], 0.0)
+    solution = farthest(np.ones(1))
+    if solution.status is Status.UNBOUNDED:
+        return math.inf
+    return max(float(solution.x[0]), 0.0) if solution.ok else 0.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import final
 
 import numpy as np
@@ -22,7 +22,8 @@ from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, instance, wrench_vector
 from cdsm.support.values import Array, Plotted, frozen
-from cdsm.tension import bounds_at, distribute_tension, solvers
+from cdsm.tension import bounds_at, distribute_tension
+from cdsm.tension.solvers import Solution, maximise
 
 _NO_MOTION = 1e-9
 """Smaller singular values of J_v, divided by the arm length, count as zero: no tip motion there."""
@@ -148,7 +149,7 @@ def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForceP
     basis = axes[:, :k]
     unbounded = axes[:, k:].T
     farthest = balanced(pose, basis, wrench, low, high)
-    if farthest(np.zeros(k)) is None:
+    if not farthest(np.zeros(k)).ok:
         return None
     points = np.zeros((0, k))
     normals = np.vstack([np.eye(k), -np.eye(k)])
@@ -161,10 +162,10 @@ def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForceP
             seen = tuple(np.round(normal, 9).tolist())
             if seen not in tried:
                 tried.add(seen)
-                found = farthest(normal)
-                if found is None or math.isinf(found[0]):
+                solution = farthest(normal)
+                if not solution.ok:
                     raise solver_failed("highs", "finds no end of the balanced forces.")
-                new += [found[1]] if found[0] > known + least else []
+                new += [solution.x] if solution.x @ normal > known + least else []
         if not new:
             break
         points = np.vstack([points, *new])
@@ -207,10 +208,10 @@ def _hull(points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     return corners, none if flat else np.searchsorted(corners, hull.simplices), normals
 
 
-Farthest = Callable[[Array], tuple[float, Array] | None]
-"""Function of a (k,): the largest a · x [N] of all balanced forces x (k,) [N], and this x.
+Farthest = Callable[[Array], Solution]
+"""Function of a (k,): of all balanced forces x (k,) [N], the one with the largest a · x.
 
-If a · x is unbounded, the result is inf, and x is NaN. It is None if no force is balanced.
+The status is UNBOUNDED if nothing bounds a · x, and INFEASIBLE if no force is balanced.
 """
 
 
@@ -234,8 +235,11 @@ def balanced(pose: Posture, U: Array, wrench: Array, low: Array, high: Array) ->
     force = float((high if np.isfinite(high).all() else np.append(low, abs(b))).max()) or 1.0
     bounds = np.append(low / force, -free), np.append(high / force, free)
 
-    def farthest(along: Array) -> tuple[float, Array] | None:
-        found = solvers.largest(np.append(np.zeros(count), along / scale), A, b / force, *bounds)
-        return found and (found[0] * force, found[1][count:] / scale * force)
+    def farthest(along: Array) -> Solution:
+        cost = np.append(np.zeros(count), along / scale)
+        solution = maximise(cost, A, b / force, *bounds)
+        if solution.status is Status.SOLVER_FAILED:
+            raise solver_failed("highs", f"finds no largest load: {solution.message}")
+        return replace(solution, x=solution.x[count:] / scale * force)
 
     return farthest

@@ -10,7 +10,6 @@ domains of the elasticities, and the arm is stable. Searches are scipy's SLSQP (
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -28,7 +27,7 @@ from cdsm.stiffness_matrix.prints import verdict
 from cdsm.support.validation import SMALLEST, instance
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, advice, distribute_tension, too_few_cables
-from cdsm.tension.solvers import DEFAULT_SOLVER, Problem, nondimensional, solve
+from cdsm.tension.solvers import DEFAULT_SOLVER, Problem, nondimensional, solve, without_warnings
 
 MARGIN: Final = 1e-2
 """An arm counts as stable down to this part of the smallest eigenvalue of K_θ at the anchor."""
@@ -129,8 +128,8 @@ class TensionSpace:
         A, b, *_, arm, force = self._balance
         low, high = bounds or self.bounds
         sides = b - A @ (F / force), (low - F) / force, (high - F) / force
-        found = solve(Problem(A, *sides, arm, force), DEFAULT_SOLVER)
-        return None if isinstance(found, str) else np.clip(F + force * found, low, high)
+        change = solve(Problem(A, *sides, arm, force), DEFAULT_SOLVER)
+        return np.clip(F + force * change.x, low, high) if change.ok else None
 
     def tension(self, F: Array) -> Tension:
         """Return F (C,) [N] as a :class:`Tension`."""
@@ -176,8 +175,7 @@ class TensionSpace:
             rule = affine(lambda F: self.at(F).smallest, MARGIN / self.floor, -MARGIN)
             every.append(("ineq", rule))
         goal = scaled("", objective)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # of iterates beyond the bounds
+        with without_warnings():  # of iterates beyond the bounds
             found = minimize(
                 goal["fun"],
                 np.clip(start, *limits) / unit,

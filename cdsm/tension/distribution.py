@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, solver_failed
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
+from cdsm.status import Status
 from cdsm.support import validation
 from cdsm.support.format import aligned
 from cdsm.support.result import Result, quantity, unit
@@ -25,8 +26,9 @@ from cdsm.support.validation import (
     wrench_vector,
 )
 from cdsm.support.values import Array, Named, frozen
-from cdsm.tension.infeasibility import explain
-from cdsm.tension.solvers import DEFAULT_SOLVER, OPTIMALITY, nondimensional, solve
+from cdsm.tension.infeasibility import infeasible
+from cdsm.tension.least_tensions import least_tensions
+from cdsm.tension.solvers import DEFAULT_SOLVER, OPTIMALITY, nondimensional
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -151,11 +153,12 @@ def distribute_tension(
     wrench = wrench_vector("wrench", wrench)
     torque = pose.jacobian.T @ wrench - pose.own_torque
     problem = nondimensional(pose.length_jacobian, torque, low, high, pose.arm.length)
-    solution = solve(problem, solver)
-    if isinstance(solution, str):
-        free = np.array([name not in fixed for name in cables.names])
-        explain(pose, problem, solver, solution, free)
-    F = frozen(solution * problem.force)
+    solution = least_tensions(problem, solver)
+    if solution.status is Status.INFEASIBLE:
+        raise infeasible(pose, problem, np.array([name not in fixed for name in cables.names]))
+    if not solution.ok:
+        raise solver_failed(solver, solution.message)
+    F = frozen(solution.x * problem.force)
     return Tension(posture=pose, values=F, wrench=wrench, minimum=low, maximum=high, solver=solver)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,33 +12,28 @@ from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.format import plural
 from cdsm.support.values import Array, frozen
-from cdsm.tension.solvers import HINT, OPTIMAL, OPTIMALITY, Problem, least
-
-_PROOF: Final = 1e-8  # least missing torque, per largest moment arm × force, that proves anything
-_ROUNDING: Final = 1e-11  # a cable that pulls less than this against it does not pull
+from cdsm.tension.least_tensions import nearest_tensions
+from cdsm.tension.solvers import OPTIMALITY, Problem, minimise
 
 
-def explain(
-    pose: Posture, problem: Problem, solver: str, fault: str, free: NDArray[np.bool_]
-) -> NoReturn:
-    """Find by linear programs why ``solver`` did not solve ``problem``; raise that as an error.
+def infeasible(pose: Posture, problem: Problem, free: NDArray[np.bool_]) -> InfeasibleTension:
+    """Find by linear programs what is missing, and how far which bounds must widen.
 
-    ``free`` (C,) marks the cables without a fixed tension; only their bounds may widen. ``fault``
-    says what the solver returned. Raises InfeasibleTension, or CdsmError if tensions exist.
+    ``problem`` has no solution. ``free`` (C,) marks the cables without a fixed tension; only their
+    bounds may widen. Return the error to raise; raise CdsmError if a linear program fails.
     """
-    F, missed = _nearest(problem)
+    nearest = nearest_tensions(problem)
+    if not nearest.ok:  # it is feasible and bounded by construction
+        raise solver_failed("highs", f"cannot tell which torque is missing: {nearest.message}")
     A, b, low, high, arm, force = problem
-    if missed <= OPTIMALITY:
-        exists = f"{fault}, though one exists with tensions of up to {F.max() * force:.2g} N"
-        edge = "the arm may be at the edge of what its cables can balance"
-        raise solver_failed(solver, f"{exists}: {edge}. {HINT}")
+    F = nearest.x
     widening = _widening(problem, free)
     blocked = math.isinf(widening) and _widening(problem, np.ones_like(free)) < math.inf
     names = pose.arm.cables.names
     missing = (b - A @ F) * arm * force
     tight = free & (np.minimum(F - low, high - F) <= OPTIMALITY)
     worst = int(abs(missing).argmax())
-    raise InfeasibleTension(
+    return InfeasibleTension(
         frozen(missing),
         pose.arm.joint_names[worst],
         widening,
@@ -94,57 +88,6 @@ def too_few_cables(arm: Manipulator) -> str:
     return f"{plural(count, 'cable')} alone cannot hold {plural(joints, 'joint')}: {needed}. "
 
 
-def is_infeasible(problem: Problem) -> bool:
-    """Whether no tensions within the bounds balance the arm, by linear programming: slow."""
-    return _nearest(problem)[1] > OPTIMALITY
-
-
-def is_proved_infeasible(problem: Problem) -> bool:
-    """Whether there is a quick proof that no tensions within the bounds balance the arm.
-
-    With x = F − low ≥ 0, the residual r of min ‖A x − b‖ is a proof by Farkas: rᵀA ≤ 0 < rᵀb.
-    Bounds above become equations x + s = high − low with slacks s ≥ 0.
-    """
-    from scipy.optimize import nnls  # slow to import
-
-    A, b, low, high, *_ = problem
-    b = b - A @ low
-    upper = np.flatnonzero(high < np.inf)
-    if upper.size:
-        bounded = np.eye(low.size)[upper]
-        none = np.zeros((b.size, upper.size))
-        A = np.block([[A, none], [bounded, np.eye(upper.size)]])
-        b = np.concatenate([b, (high - low)[upper]])
-    try:
-        x, missing = nnls(A, b)
-    except RuntimeError:  # too many iterations
-        return False
-    r = b - A @ x
-    work = r @ b
-    most = abs(A).max(axis=0) * abs(r).max()
-    proof = missing > _PROOF and work > _PROOF * (abs(r) @ abs(b))
-    return bool(proof and ((r @ A) <= _ROUNDING * most).all())
-
-
-def _nearest(problem: Problem) -> tuple[Array, float]:
-    """Return the tensions (C,) [-] that miss the balance least, and the torque they miss [-]."""
-    A, b, low, high, *_ = problem
-    nv, count = A.shape
-    # variables: F, then the positive and the negative part of the missing torque; HiGHS drops
-    # entries below 1e-9, so each cable is scaled by its own largest moment arm
-    lever = abs(A).max(axis=0)
-    lever[lever == 0.0] = 1.0
-    nearest = least(
-        np.repeat([0.0, 1.0], [count, 2 * nv]),
-        A_eq=np.hstack([A / lever, np.eye(nv), -np.eye(nv)]),
-        b_eq=b,
-        bounds=[*zip(low * lever, high * lever, strict=True), *[(0.0, None)] * (2 * nv)],
-    )
-    if nearest.status != OPTIMAL:  # it is feasible and bounded by construction
-        raise solver_failed("highs", f"cannot tell whether tensions exist: {nearest.message}")
-    return nearest.x[:count] / lever, float(nearest.fun)
-
-
 def _widening(problem: Problem, free: NDArray[np.bool_]) -> float:
     """Compute how far the bounds of ``free`` cables (C,) must widen [N]; inf if nothing helps."""
     A, b, low, high, _, force = problem
@@ -155,5 +98,5 @@ def _widening(problem: Problem, free: NDArray[np.bool_]) -> float:
     finite = np.isfinite(sides)
     balance = np.column_stack([A, np.zeros(nv)])
     widest = np.append(np.zeros(count), 1.0)
-    found = least(widest, A_ub=rows[finite], b_ub=sides[finite], A_eq=balance, b_eq=b)
-    return float(found.x[-1]) * force if found.status == OPTIMAL else math.inf
+    solution = minimise(widest, A_ub=rows[finite], b_ub=sides[finite], A_eq=balance, b_eq=b)
+    return float(solution.x[-1]) * force if solution.ok else math.inf

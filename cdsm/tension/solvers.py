@@ -1,5 +1,8 @@
 """Programs of cable tensions, solved by qpsolvers, and linear ones by HiGHS.
 
+Each function returns a :class:`Solution`: the solution with a status, or the reason why there is
+none.
+
 :func:`solve` minimises ½‖x‖² subject to A x = b and low ≤ x ≤ high, and verifies the solution. The
 problem is strictly convex, so x is its optimum exactly if A x = b and, for some multipliers y,
 x = clip(−Aᵀ y, low, high). These are the Karush-Kuhn-Tucker conditions (stationarity, bounds and
@@ -9,23 +12,18 @@ complementarity) with the multipliers z = −x − Aᵀ y of the bounds eliminat
 from __future__ import annotations
 
 import math
+import threading
 import warnings
-from contextlib import nullcontext, suppress
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from cdsm.errors import solver_failed
+from cdsm.status import Status
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array
-
-if TYPE_CHECKING:
-    from scipy.optimize import OptimizeResult
-
-OPTIMAL = 0
-INFEASIBLE = 2
-UNBOUNDED = 3
-"""Status numbers of scipy that decide a program; all others leave it undecided."""
 
 DEFAULT_SOLVER: Final = "daqp"  # exact, and the fastest in measurements
 OPTIMALITY: Final = 1e-9  # largest accepted violation, relative to the largest force
@@ -35,6 +33,8 @@ _CURVATURE: Final = 1e-8  # ε that makes a linear program a quadratic one
 _FARTHEST: Final = 1e4  # variables of a linear program beyond this may be unbounded
 _FEASIBLE: Final = 1e-8  # largest accepted violation of A x = b by a linear program
 _TIGHT: Final = 1e-10  # allowed violation of a constraint of order one; HiGHS's default is 1e-7
+_STATUS: Final = {0: Status.OK, 2: Status.INFEASIBLE, 3: Status.UNBOUNDED}  # by scipy's number
+_WARNINGS: Final = threading.RLock()
 NO_ARM: Final = 1e-15  # moment arms below this part of the arm's length are rounding
 
 # DAQP is three times as fast with 60 cables if it eliminates the balance first; OSQP misses bounds
@@ -57,6 +57,38 @@ class Problem(NamedTuple):
     force: float  # power of two above all lower bounds and all torques / arm [N]
 
 
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """Solution of a program, or the reason why there is none.
+
+    Attributes:
+        x: The solution (n,); NaN unless the status is OK.
+        status: OK, INFEASIBLE, UNBOUNDED or SOLVER_FAILED.
+        message: What the solver found instead, with the remedy; empty if the status is OK.
+    """
+
+    x: Array
+    status: Status = Status.OK
+    message: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is a solution."""
+        return self.status is Status.OK
+
+
+def no_solution(size: int, status: Status, message: str = "") -> Solution:
+    """Return the record of a program with ``size`` variables that has no solution."""
+    return Solution(np.full(size, np.nan), status, message or status.message)
+
+
+@contextmanager
+def without_warnings() -> Iterator[None]:
+    """Ignore warnings of solvers; filters are of the process, so one thread at a time."""
+    with _WARNINGS, warnings.catch_warnings(action="ignore"):
+        yield
+
+
 def nondimensional(J: Array, torque: Array, low: Array, high: Array, length: float) -> Problem:
     """Scale the balance ``J``ᵀ F = ``torque`` of an arm, without rounding; J_L is (C, nv)."""
     arm = 2.0 ** math.frexp(abs(J).max())[1]
@@ -74,40 +106,48 @@ def installed_solvers() -> list[str]:
     return sorted(qpsolvers.available_solvers)
 
 
-def solve(problem: Problem, solver: str) -> Array | str:
-    """Return the verified optimum x (C,) [-], or a text that says what the solver found instead.
+def solve(problem: Problem, solver: str) -> Solution:
+    """Return the verified optimum x (C,) [-]; SOLVER_FAILED if the solver finds none.
 
-    Raises InvalidInput if the solver is not installed, CdsmError if it breaks down.
+    Raises InvalidInput if the solver is not installed.
     """
     import qpsolvers
 
     one_of("installed solver", solver, qpsolvers.available_solvers)
     A, b, low, high, *_ = problem
     basis = _independent(A)
+
+    def failed(message: str) -> Solution:
+        return no_solution(low.size, Status.SOLVER_FAILED, message)
+
     sides: dict[str, Array] = {"A": basis.T @ A, "b": basis.T @ b, "lb": low, "ub": high}
     qp = qpsolvers.Problem(np.eye(low.size), np.zeros(low.size), **sides)
     # others warn of dense matrices, and of failures that are reported below; this takes 20 µs
-    quiet = nullcontext() if solver == DEFAULT_SOLVER else warnings.catch_warnings(action="ignore")
+    quiet = nullcontext() if solver == DEFAULT_SOLVER else without_warnings()
     try:
         with quiet:
-            found = qpsolvers.solve_problem(qp, solver, **_SETTINGS.get(solver, {}))
+            answer = qpsolvers.solve_problem(qp, solver, **_SETTINGS.get(solver, {}))
     except Exception as error:  # each solver has its own error types
-        raise solver_failed(solver, f"failed: {error}. {HINT}") from error
-    if not found.found or found.x is None or found.y is None:
-        return "found no solution with multipliers"
-    x = np.asarray(found.x)
-    y = basis @ found.y
+        return failed(f"failed: {error}")
+    if not answer.found or answer.x is None or answer.y is None:
+        return failed("found no solution with multipliers")
+    x = np.asarray(answer.x)
+    y = basis @ answer.y
     if not np.isfinite([x.sum(), y.sum()]).all():
-        return "calls numbers optimal that are not finite"
+        return failed("calls numbers optimal that are not finite")
     least = -(y @ A)  # the optimum but for the bounds
     x = np.where(least <= low, low, np.where(least >= high, high, x))
     missed = violation(problem, x, y)
     if missed > _ROUNDING:
-        exact = _corrected(problem, x, y)
-        x, missed = min((x, missed), (exact[0], violation(problem, *exact)), key=lambda e: e[1])
+        corrected, multipliers = _corrected(problem, x, y)
+        remaining = violation(problem, corrected, multipliers)
+        if remaining < missed:
+            x = corrected
+            missed = remaining
     if missed > OPTIMALITY:
-        return f"calls a point optimal that misses it by {missed:.1e} ({OPTIMALITY:g} is allowed)"
-    return np.asarray(np.minimum(np.maximum(x, low), high))
+        allowed = f"{missed:.1e} ({OPTIMALITY:g} is allowed)"
+        return failed(f"calls a point optimal that misses it by {allowed}")
+    return Solution(np.asarray(np.minimum(np.maximum(x, low), high)))
 
 
 def _independent(A: Array) -> Array:
@@ -135,21 +175,25 @@ def _corrected(problem: Problem, x: Array, y: Array) -> tuple[Array, Array]:
     return x, y - np.linalg.lstsq(A[:, free].T, x[free] + y @ A[:, free])[0]
 
 
-def least(cost: Array, **constraints: Any) -> OptimizeResult:
+def minimise(cost: Array, **constraints: Any) -> Solution:
     """Minimise cost · x by scipy's ``linprog``, whose keywords are ``constraints``."""
     from scipy.optimize import linprog  # slow to import
 
     names = "primal_feasibility_tolerance", "dual_feasibility_tolerance"
-    return linprog(cost, **constraints, method="highs", options=dict.fromkeys(names, _TIGHT))
+    answer = linprog(cost, **constraints, method="highs", options=dict.fromkeys(names, _TIGHT))
+    status = _STATUS.get(answer.status, Status.SOLVER_FAILED)
+    if status is not Status.OK:
+        return no_solution(cost.size, status, str(answer.message))
+    return Solution(np.asarray(answer.x, dtype=np.float64))
 
 
-def largest(cost: Array, A: Array, b: Array, low: Array, high: Array) -> tuple[float, Array] | None:
-    """Maximise cost · x subject to A x = b and low ≤ x ≤ high; return the maximum and x (n,).
+def maximise(cost: Array, A: Array, b: Array, low: Array, high: Array) -> Solution:
+    """Maximise cost · x subject to A x = b and low ≤ x ≤ high, x (n,).
 
     DAQP solves the quadratic program −cost · x + ½ε ‖x‖², which for ε = 1e-8 ends in the vertex of
     the linear one; another ε moves it, or fails near straight postures. A, b, the finite bounds and
-    x must be of order one. Where DAQP finds nothing, or beyond 1e4, HiGHS decides. The result is
-    None if no x is feasible, and (inf, NaN) if cost · x is unbounded.
+    x must be of order one. Where DAQP finds nothing, or beyond 1e4, HiGHS decides. The status is
+    INFEASIBLE if no x is feasible, and UNBOUNDED if nothing bounds cost · x.
     """
     import qpsolvers
 
@@ -159,20 +203,16 @@ def largest(cost: Array, A: Array, b: Array, low: Array, high: Array) -> tuple[f
     qp = qpsolvers.Problem(
         _CURVATURE * np.eye(cost.size), -cost / unit, A=A, b=b, lb=lowest, ub=highest
     )
-    with suppress(qpsolvers.SolverError):
-        found = qpsolvers.solve_problem(qp, DEFAULT_SOLVER, primal_tol=1e-11, dual_tol=1e-11)
-        x = np.full_like(cost, np.nan) if found.x is None else np.asarray(found.x)
-        if abs(A @ x - b).max() < _FEASIBLE and abs(x).max() < 0.9 * _FARTHEST:
-            return float(cost @ x), x
+    try:
+        answer = qpsolvers.solve_problem(qp, DEFAULT_SOLVER, primal_tol=1e-11, dual_tol=1e-11)
+    except qpsolvers.SolverError:
+        x = None
+    else:
+        x = answer.x
+    if x is not None and abs(A @ x - b).max() < _FEASIBLE and abs(x).max() < 0.9 * _FARTHEST:
+        return Solution(np.asarray(x))
     lever = abs(A).max(axis=0)  # HiGHS drops entries below 1e-9
     lever[lever == 0.0] = 1.0
     bounds = np.column_stack([low * lever, high * lever])
-    program = least(-cost / lever, A_eq=A / lever, b_eq=b, bounds=bounds)
-    if program.status == INFEASIBLE:
-        return None
-    if program.status == UNBOUNDED:
-        return math.inf, np.full_like(cost, np.nan)
-    if program.status != OPTIMAL:
-        raise solver_failed("highs", f"finds no largest load: {program.message}")
-    x = program.x / lever
-    return float(cost @ x), x
+    solution = minimise(-cost / lever, A_eq=A / lever, b_eq=b, bounds=bounds)
+    return replace(solution, x=solution.x / lever)

@@ -1,12 +1,14 @@
 """Tensions at many postures: each row the optimum of the single posture, or proof of none."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
+import qpsolvers
 
 import cdsm
-from cdsm.batch import Tensions, chunk
+from cdsm.batch import Tensions
 from cdsm.support.values import Array
 from tests.batch.test_evaluation import custom_arm
 from tests.support.arms import STEEL, mixed_arm, random_arm, readme_geometry
@@ -142,16 +144,23 @@ def test_rows_that_the_solver_leaves_open_are_infeasible_only_with_a_proof(
     q, wrench = postures(arm, 60, 0.9), 0.1 * loads(60)
     expected = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
     assert 5 < np.count_nonzero(expected.ok) < 55
-    monkeypatch.setattr(chunk, "solve", lambda *_: "found nothing")
+    truth = qpsolvers.solve_problem
+
+    def finds_nothing(*arguments: Any, **options: Any) -> qpsolvers.Solution:
+        solution = truth(*arguments, **options)
+        solution.found = False
+        return solution
+
+    monkeypatch.setattr(qpsolvers, "solve_problem", finds_nothing)
     found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
     np.testing.assert_array_equal(found.status[~expected.ok], expected.status[~expected.ok])
     lost = found.status[expected.ok]
     assert set(lost.tolist()) <= {cdsm.Status.OK, cdsm.Status.SOLVER_FAILED}
 
-    def failing(*_: object) -> None:
-        raise cdsm.CdsmError("solver failed.", cdsm.Status.SOLVER_FAILED)
+    def breaks_down(*_: object, **__: object) -> None:
+        raise qpsolvers.SolverError("it broke down")
 
-    monkeypatch.setattr(chunk, "solve", failing)
+    monkeypatch.setattr(qpsolvers, "solve_problem", breaks_down)
     found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
     np.testing.assert_array_equal(found.status[~expected.ok], expected.status[~expected.ok])
     coupled = cdsm.Manipulator(readme_geometry(coupled=True), STEEL)

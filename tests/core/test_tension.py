@@ -2,6 +2,8 @@
 
 import math
 import re
+import warnings
+from concurrent import futures
 from typing import Any
 
 import numpy as np
@@ -187,3 +189,27 @@ def test_a_wrong_optimum_is_corrected_if_it_is_near_and_caught_if_not(
     with pytest.raises(cdsm.CdsmError, match=r"'daqp'.*though one exists") as caught:
         cdsm.distribute_tension(POSE, 10.0, 500.0)
     assert caught.value.status == cdsm.Status.SOLVER_FAILED
+
+
+def test_a_solver_that_breaks_down_does_not_hide_that_nothing_balances_the_arm(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def breaks_down(*_: object, **__: object) -> None:
+        raise qpsolvers.SolverError("it broke down")
+
+    monkeypatch.setattr(qpsolvers, "solve_problem", breaks_down)
+    with pytest.raises(cdsm.CdsmError, match=r"'daqp' failed: it broke down, though one exists"):
+        cdsm.distribute_tension(POSE, 10.0, 500.0)
+    with pytest.raises(cdsm.InfeasibleTension):
+        cdsm.distribute_tension(POSE, 10.0, 10.5)
+
+
+def test_solvers_in_threads_leave_the_filters_of_warnings_as_they_were() -> None:
+    before = list(warnings.filters)
+    with futures.ThreadPoolExecutor(8) as pool:
+        jobs = [
+            pool.submit(cdsm.distribute_tension, POSE, 10.0 + k, 500.0, solver="osqp")
+            for k in range(40)
+        ]
+        assert all(job.result().values.min() >= 10.0 for job in jobs)
+    assert warnings.filters == before
