@@ -7,6 +7,7 @@ from cdsm import presets as presets
 from cdsm import view as view
 from cdsm.arm_file.arm import read_cables as read_cables
 from cdsm.arm_file.arm import write_cables as write_cables
+from cdsm.arm_parameters import ArmParameters as ArmParameters
 from cdsm.batch import distribute_tensions as distribute_tensions
 from cdsm.batch import evaluate as evaluate
 from cdsm.cable import Cable as Cable
@@ -57,7 +58,6 @@ from cdsm.measures.indices import isotropy as isotropy
 from cdsm.measures.indices import tension_factor as tension_factor
 from cdsm.measures.payload import payload as payload
 from cdsm.measures.polytope import force_polytope as force_polytope
-from cdsm.parameters import ArmParameters as ArmParameters
 from cdsm.planning.path import plan_path as plan_path
 from cdsm.planning.plan import plan_stiffness as plan_stiffness
 from cdsm.planning.range import stiffness_range as stiffness_range

@@ -241,6 +241,20 @@ def serpentine_cables(
     return tuple(cables)
 
 
+def holes_like(cable: Cable, other: Cable) -> tuple[Site, ...]:
+    """Return the sites of ``cable``, with the friction and the wrap of the holes of ``other``.
+
+    A hole that only ``cable`` passes gets the friction of the nearest hole that ``other`` passes.
+    """
+    sites = list(cable.sites)
+    known = other._holes
+    for i in cable._holes if known else ():
+        near = min(max(i, known[0]), known[-1])
+        wrap = other.sites[near].wrap if i == near else 0.0
+        sites[i] = replace(sites[i], friction=other.sites[near].friction, wrap=wrap)
+    return tuple(sites)
+
+
 def require_own_cables(geometry: Geometry, cables: Sequence[Cable]) -> None:
     """Refuse the ``cables`` of an arm that are not routed and led as its ``geometry`` says.
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, fields
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, Self, final, get_args
 
 from cdsm.errors import LINES, CdsmError, FileError, GeometryError, InvalidInput, listed
+from cdsm.parameters import METRE, NEWTON, PARAMETERS, RADIAN, Source
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import Number, parse, read_toml, record, toml_text
 from cdsm.support.validation import one_of, scalar, sequence_of, text
@@ -17,11 +18,22 @@ from cdsm.support.validation import one_of, scalar, sequence_of, text
 Distribution = Literal["normal", "uniform"]
 
 EVERY: Final = "*"  # pattern of the names of all inputs
-_COMMON = "rigidity", "joint_stiffness", "friction"  # one error for all: one spool, one material
-_LARGEST = {
-    **dict.fromkeys(("rigidity", "spring", "joint_stiffness", "friction"), 0.5),
-    **dict.fromkeys(("joint_angle", "hole_angle"), 0.3),
+_READINGS: Final[dict[str, Source]] = {
+    "joint_angle": Source(unit=RADIAN, largest=0.3),
+    "joint_position": Source(unit=METRE),
+    "tension": Source(unit=NEWTON),
 }
+_SITE: Final[dict[str, Source]] = {"site": Source(unit=METRE)}
+
+
+def sources() -> dict[str, Source]:
+    """Return all numbers that may have a tolerance: parameters, each number once, and readings.
+
+    Random errors are drawn in this order: another one gives other draws of the same seed.
+    """
+    own = {name: row for name, row in PARAMETERS.items() if row.shares is None}
+    relative = {name: row for name, row in own.items() if row.is_relative}
+    return relative | _READINGS | own | _SITE
 
 
 @final
@@ -67,24 +79,27 @@ OneOrMore = float | Tolerance | Sequence[Tolerance]
 
 
 @final
-@dataclass(frozen=True, kw_only=True, repr=False)
+@dataclass(frozen=True, init=False, repr=False)
 class Tolerances:
     """Uncertainties of the dimensions of an arm and of the values measured on it.
 
     A source is a standard uncertainty (one sigma) as a number, a :class:`Tolerance`, or a list of
-    tolerances, each for the inputs that its ``of`` names. It is kept as a tuple of those that are
-    not zero. A number for ``rigidity``, ``joint_stiffness`` or ``friction`` has the correlation 1,
-    since cables are of one spool, a backbone is one rod and disks are of one material; other
-    numbers have the correlation 0.
+    tolerances, each for the inputs that its ``of`` names. A number for ``rigidity``,
+    ``joint_stiffness``, ``bending_stiffness`` or ``friction`` has the correlation 1, since cables
+    are of one spool, a backbone is one rod and disks are of one material; other numbers have the
+    correlation 0. ``tolerances.lead`` is the tuple of the tolerances of a source that are not zero.
 
-    Attributes:
+    Args:
         rigidity: EA of the law of each cable; relative [-].
         spring: k_series in series with each cable, such as its anchor or drive; relative [-].
         joint_stiffness: k of the spring of each joint, those of beams included; relative [-].
+        bending_stiffness: EI of each neck, gap or link that bends; relative [-].
         joint_angle: Angle of each joint that turns [rad].
         joint_position: Coordinate of each joint that slides [m].
         tension: Each measured cable tension [N].
         lead: Straight length of each cable before the base disk [m].
+        slack: Wire that each motor takes in before its cable pulls [m].
+        gain: Wire taken in per pull that each motor reports [-].
         hole_radius: Distance of each hole from the axis of its link [m].
         hole_angle: Angle of each hole about the axis of its link [rad].
         disk_offset: Distance of each disk from its joint [m]; place of a backbone's disk.
@@ -96,28 +111,26 @@ class Tolerances:
     Raises InvalidInput if one is negative, not a number, or larger than a plausible error.
     """
 
-    rigidity: OneOrMore = 0.0
-    spring: OneOrMore = 0.0
-    joint_stiffness: OneOrMore = 0.0
-    joint_angle: OneOrMore = 0.0
-    joint_position: OneOrMore = 0.0
-    tension: OneOrMore = 0.0
-    lead: OneOrMore = 0.0
-    hole_radius: OneOrMore = 0.0
-    hole_angle: OneOrMore = 0.0
-    disk_offset: OneOrMore = 0.0
-    link_length: OneOrMore = 0.0
-    link_mass: OneOrMore = 0.0
-    friction: OneOrMore = 0.0
-    site: OneOrMore = 0.0
+    _pairs: tuple[tuple[str, tuple[Tolerance, ...]], ...]
 
-    def __post_init__(self) -> None:
-        self.__dict__.update({name: _checked(name, getattr(self, name)) for name in SOURCES})
+    def __init__(self, **errors: OneOrMore) -> None:
+        checked = {name: _checked(name, value) for name, value in errors.items()}
+        pairs = [(name, checked[name]) for name in sources() if checked.get(name)]
+        object.__setattr__(self, "_pairs", tuple(pairs))
+
+    def replace(self, **errors: OneOrMore) -> Tolerances:
+        """Return tolerances with other ones of these sources: ``tolerances.replace(lead=1e-3)``."""
+        return Tolerances(**{**self.given, **errors})
 
     @property
     def given(self) -> Mapping[str, tuple[Tolerance, ...]]:
         """All tolerances that are not zero, by source of uncertainty."""
-        return {name: parts for name in SOURCES if (parts := getattr(self, name))}
+        return dict(self._pairs)
+
+    def __getattr__(self, name: str) -> tuple[Tolerance, ...]:
+        if name.startswith("_") or name not in sources():
+            raise AttributeError(f"Tolerances have no source {name!r}")
+        return self.given.get(name, ())
 
     def __repr__(self) -> str:
         return f"Tolerances({', '.join(f'{name}={parts}' for name, parts in self.given.items())})"
@@ -144,24 +157,22 @@ class Tolerances:
         return write_text(path, head + "\n" + toml_text(table_of(self)))
 
 
-SOURCES: Final = tuple(field.name for field in fields(Tolerances))
-
-
-def _checked(source: str, value: Any) -> tuple[Tolerance, ...]:
+def _checked(name: str, value: Any) -> tuple[Tolerance, ...]:
     """Return the tolerances of a source that are not zero; InvalidInput names the source."""
+    source = sources()[one_of("source of uncertainty", name, sources())]
     try:
         if not isinstance(value, (list, tuple, Tolerance)):
-            value = Tolerance(value, correlation=float(source in _COMMON))
-        each = [value] if isinstance(value, Tolerance) else value
-        given = sequence_of("tolerances", each, Tolerance)
+            value = Tolerance(value, correlation=float(source.is_common))
+        one_or_more = [value] if isinstance(value, Tolerance) else value
+        tolerances = sequence_of("tolerances", one_or_more, Tolerance)
     except InvalidInput as error:
-        raise InvalidInput(source, str(error).removeprefix("standard: ")) from None
-    u = max([0.0, *(one.standard for one in given)])
-    largest = _LARGEST.get(source, math.inf)
-    if u > largest:
-        said = f"a standard uncertainty of {u:g} given; up to {largest:g} is a tolerance"
-        raise InvalidInput(source, f"{said}. EA and springs are relative, angles in rad.")
-    return tuple(each for each in given if each.standard)
+        raise InvalidInput(name, str(error).removeprefix("standard: ")) from None
+    u = max([0.0, *(tolerance.standard for tolerance in tolerances)])
+    if u > source.largest:
+        unit = "relative" if source.is_relative else f"in {source.unit.si or 'the number itself'}"
+        said = f"a standard uncertainty of {u:g} given; up to {source.largest:g} is a tolerance"
+        raise InvalidInput(name, f"{said}. It is {unit}.")
+    return tuple(tolerance for tolerance in tolerances if tolerance.standard)
 
 
 @record
@@ -175,7 +186,9 @@ class _Entry:
     of: str = EVERY
 
     def built(self, source: str) -> Tolerance:
-        rho = float(source in _COMMON) if self.correlation is None else self.correlation
+        rho = self.correlation
+        if rho is None:
+            rho = float(sources()[source].is_common)
         if self.standard is not None and self.within is None:
             kind = self.distribution or "normal"
             return Tolerance(self.standard, distribution=kind, correlation=rho, of=self.of)
@@ -194,7 +207,7 @@ def from_table(table: Mapping[str, Any]) -> Tolerances:
     faults = []
     for name, value in table.items():
         try:
-            one_of("source of uncertainty", name, SOURCES)
+            one_of("source of uncertainty", name, sources())
             if isinstance(value, (dict, list)):
                 tables = [value] if isinstance(value, dict) else value
                 value = [parse(_Entry, each).built(name) for each in tables]

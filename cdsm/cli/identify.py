@@ -97,8 +97,8 @@ def identify(
     A test applies a force along a direction and removes it, with locked motors. The answer gives
     each parameter with a 95 % interval, and warns of parameters that the tests do not determine.
     """
+    from cdsm.arm_parameters import ArmParameters
     from cdsm.identification.experiment_plan import plan_tests
-    from cdsm.parameters import ArmParameters
 
     described = options.read(arm, changes)
     ranges = _ranges(free)

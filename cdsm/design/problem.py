@@ -12,12 +12,13 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.arm_parameters import ArmParameters
 from cdsm.cable import require_own_cables
 from cdsm.design.goals import Constraint, Measure, Objective
 from cdsm.design.variables import WHOLE, Value, Variable, changed
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.parameters import PARAMETERS, ArmParameters
+from cdsm.parameters import PARAMETERS
 from cdsm.support.format import plural
 from cdsm.support.validation import NO_WRENCH, instance, number_array, sequence_of
 from cdsm.support.values import Array, Given, ReadOnlyState, frozen

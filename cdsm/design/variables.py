@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final, final
 
-from cdsm.cable import Cable, serpentine_cables
+from cdsm.arm_parameters import ArmParameters
+from cdsm.cable import Cable, holes_like, serpentine_cables
 from cdsm.errors import InvalidInput, warn
 from cdsm.geometry import CableRoute, Geometry
 from cdsm.geometry.uniform import evenly_spaced, hinge_hole_angles
 from cdsm.manipulator import Manipulator
-from cdsm.parameters import PARAMETERS, ArmParameters, holes_like
+from cdsm.parameters import NEWTON, NUMBER, PARAMETERS, Unit
 from cdsm.support.format import place
 from cdsm.support.validation import (
     WIDEST,
@@ -33,16 +34,7 @@ Value = float | int | str
 WHOLE: Final = ("end", "cables_per_joint")
 """Variables that are whole numbers."""
 
-_NAMES: Final = (*PARAMETERS, *WHOLE, "wire", "minimum")
-_SI: Final = {"mm": "m", "deg": "rad", "g": "kg", "N/mm": "N/m"}
-_KINDS: Final = {
-    "m": "length",
-    "kg": "mass",
-    "N/m": "stiffness",
-    "N": "tension",
-    "N m/rad": "spring",
-    "N m²": "bending stiffness",
-}
+_OF_ARM: Final = (*WHOLE, "wire", "minimum")  # variables that are no parameters
 _WIDEST_ANGLE = 4.0 * math.pi  # a range of angles beyond this [rad] is probably in degrees
 
 
@@ -72,7 +64,8 @@ class Variable:
     choices: Sequence[Value] = ()
 
     def __post_init__(self) -> None:
-        one_of("variable", self.kind if instance("of", self.of, str) else "", _NAMES)
+        kind = self.kind if instance("of", self.of, str) else ""
+        one_of("variable", kind, (*PARAMETERS, *_OF_ARM))
         if not isinstance(self.choices, (tuple, list)):
             raise InvalidInput("choices", f"{self.choices!r} given; give a list.")
         self.__dict__.update(choices=tuple(self.choices))
@@ -98,10 +91,10 @@ class Variable:
     def _range(self) -> tuple[float, float]:
         if self.low is None or self.high is None:
             raise InvalidInput(self.of, "needs both low and high.")
-        kind = _KINDS.get(self.unit)
+        kind = self._unit.quantity
         low, high = (
-            scalar(self.of, each) if kind is None else quantity(self.of, each, kind, zero=True)
-            for each in (self.low, self.high)
+            scalar(self.of, end) if kind is None else quantity(self.of, end, kind, zero=True)
+            for end in (self.low, self.high)
         )
         if not low < high:
             raise InvalidInput(self.of, f"from {low:g} to {high:g} given; give low < high.")
@@ -129,10 +122,13 @@ class Variable:
     @property
     def unit(self) -> str:
         """SI unit, or empty."""
-        if self.kind == "minimum":
-            return "N"
-        shown = PARAMETERS[self.kind].unit if self.kind in PARAMETERS else ""
-        return _SI.get(shown, shown)
+        return self._unit.si
+
+    @property
+    def _unit(self) -> Unit:
+        if self.kind in PARAMETERS:
+            return PARAMETERS[self.kind].unit
+        return NEWTON if self.kind == "minimum" else NUMBER
 
     @property
     def is_continuous(self) -> bool:
@@ -150,9 +146,7 @@ class Variable:
             return f"{value}"
         if self.unit in ("m", "rad"):
             return place(value, self.unit)
-        if self.kind not in PARAMETERS:
-            return f"{value:.4g} {self.unit}".rstrip()
-        unit, size, *_ = PARAMETERS[self.kind]
+        unit, size = self._unit.shown
         return f"{value / size:.4g} {unit}".rstrip()
 
     def require(self, arm: Manipulator) -> None:

@@ -82,6 +82,15 @@ class Geometry(Printed):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        """Check all parts together; joints keep only radii that differ from the common one."""
+        radii = self.hole_radii
+        common = self.hole_radius if self.hole_radius in radii else radii[0]
+        own = [None if common == R else R for R in radii]
+        joints = [
+            joint if joint.hole_radius == R else replace(joint, hole_radius=R)
+            for joint, R in zip(self.joints, own, strict=True)
+        ]
+        self.__dict__.update(hole_radius=common, joints=tuple(joints))
         if faults := [*self._faults()] or self.chain.faults():
             raise CrossFaults(faults)
         for doubt in self._doubts():

@@ -22,7 +22,7 @@ from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import Direction, fraction, instance
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
-from cdsm.tolerances import Tolerances
+from cdsm.tolerances import Tolerances, sources
 from cdsm.tolerancing.inputs import Errors, Group
 from cdsm.tolerancing.measurand import Measurand, MeasurandName, measurand_of
 
@@ -31,11 +31,6 @@ _DRAWN = 100  # random arms that show how far from linear a measurand is
 _STEP = 0.1  # of differences, in standard uncertainties
 _ROWS = 1000  # arms in one batch, which bounds its memory
 _ROUNDING = 1e-9  # a smaller relative uncertainty is rounding
-_DEGREES = (math.pi / 180.0, " deg")
-_PERCENT = (1e-2, " %")
-_UNITS = {"joint_angle": _DEGREES, "hole_angle": _DEGREES, "rigidity": _PERCENT, "spring": _PERCENT}
-_UNITS |= {"joint_stiffness": _PERCENT}
-_UNITS |= {"tension": (1.0, " N"), "link_mass": (1e-3, " g"), "friction": (1.0, "")}  # or mm
 
 
 @final
@@ -119,9 +114,9 @@ class Uncertainty(Result, Plotted):
             f"{'source':<16}{'tolerance':>16}{f'contribution [{unit}]':>24}{'of variance':>14}",
         ]
         for source, u in self.contributions.items():
-            scale, of_inputs = _UNITS.get(source, (1e-3, " mm"))
-            given = np.array([each.standard for each in self.tolerances.given[source]])
-            tolerance = span(given / scale, "{:.3g}".format) + of_inputs
+            shown, scale = _unit_of_errors(source)
+            errors = np.array([each.standard for each in self.tolerances.given[source]])
+            tolerance = f"{span(errors / scale, '{:.3g}'.format)} {shown}".rstrip()
             share = 100.0 * (u / (self.standard_uncertainty or 1.0)) ** 2
             line = f"{source:<16}{tolerance:>16}{u / size:>24.3g}{share:>12.3g} %"
             lines += [line] if u else []
@@ -160,6 +155,12 @@ class Uncertainty(Result, Plotted):
 
     def _labels(self) -> dict[str, Sequence[object]]:
         return {"source": tuple(self.contributions)}
+
+
+def _unit_of_errors(source: str) -> tuple[str, float]:
+    """Return the unit in which people read the errors of a source, and its size in SI."""
+    row = sources()[source]
+    return ("%", 1e-2) if row.is_relative else row.unit.shown
 
 
 def uncertainty(

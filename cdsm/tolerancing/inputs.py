@@ -19,20 +19,16 @@ from scipy.sparse import csr_matrix
 from cdsm.batch.rows import Body, rows_of
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
+from cdsm.parameters import PARAMETERS
 from cdsm.support.values import Array
-from cdsm.tolerances import EVERY, Tolerance, Tolerances
+from cdsm.tolerances import EVERY, Tolerance, Tolerances, sources
 from cdsm.tolerancing.dimensions import Change, changes_of_chain, changes_of_holes
+from cdsm.tolerancing.rebuilt import labels_of
 from cdsm.urdf import CROSS_MASS
 
 Errors = Mapping[str, Array]
 """Errors (N, n) of the n inputs of each source, for N arms; a source that is missing has none."""
 
-_POSITIVE = (
-    "rigidity",
-    "spring",
-    "joint_stiffness",
-)  # sources with relative errors of positive numbers
-_LENGTHS = ("lead", "hole_radius", "disk_offset", "link_length", "site")
 _LARGEST = 0.1  # largest standard uncertainty of a length, divided by the length of the arm
 
 
@@ -57,6 +53,7 @@ class Inputs:
 
     Attributes:
         labels: Names of the inputs of each source, such as ``cable2_1 on link1, site 3``.
+        rebuilt: Those of the sources for which arms are built anew (:mod:`.rebuilt`).
     """
 
     def __init__(self, arm: Manipulator) -> None:
@@ -96,6 +93,16 @@ class Inputs:
             entries = np.concatenate(values), (np.concatenate(rows), columns)
             self._maps[source] = csr_matrix(entries, (self._numbers.size, len(rows)))
 
+        self.rebuilt: dict[str, Sequence[str]] = {}
+        self._lacks = dict[str, str]()
+        for name in [name for name in sources() if name in PARAMETERS and name not in self.labels]:
+            try:
+                self.rebuilt[name] = labels_of(arm, name)
+            except InvalidInput as error:
+                if arm.is_serpentine:
+                    self._lacks[name] = str(error).removeprefix(f"{name}: ")
+        self.labels |= self.rebuilt
+
     def bodies(self, errors: Errors, count: int) -> Body:
         """Return the dimensions of ``count`` arms with ``errors``."""
         numbers = self._numbers[:, None]
@@ -121,14 +128,16 @@ class Inputs:
         tolerance gives, if two tolerances belong to one input, or if a length is too uncertain.
         """
         found = []
-        (arm, most) = self._arm
+        arm, most = self._arm
+        known = sources()
         for source, given in tolerances.given.items():
             names = self.labels.get(source, ())
             taken = np.zeros(0, dtype=np.intp)
             if not names:
-                raise InvalidInput(source, f"{arm} {_LACKS.get(source, _NO_HOLES)}")
+                said = self._lacks.get(source, f"{arm} {_LACKS.get(source, _NO_HOLES)}")
+                raise InvalidInput(source, said)
             for each in given:
-                if source in _LENGTHS and each.standard > most:
+                if known[source].unit.si == "m" and each.standard > most:
                     said = f"a standard uncertainty of {each.standard:g} m given; up to {_LARGEST} "
                     said += f"of the arm's length, {most:.2g} m, is a tolerance. It is in m."
                     raise InvalidInput(source, said)
@@ -152,6 +161,7 @@ class Inputs:
         Correlated errors are weighted sums of independent ones. A positive number, 1 + a relative
         error, is lognormal instead of normal, with the same mean and standard uncertainty.
         """
+        known = sources()
         errors = {g.source: np.zeros((draws, len(self.labels[g.source]))) for g in groups}
         for source, inputs, tolerance in groups:
             u = tolerance.standard
@@ -162,7 +172,7 @@ class Inputs:
             x = rng.standard_normal(size) if normal else rng.uniform(-side, side, size)
             x = math.sqrt(1.0 - rho) * x[:, 1:] + math.sqrt(rho) * x[:, :1]
             square = math.log1p(u**2)  # of the logarithm
-            positive = source in _POSITIVE and normal
+            positive = known[source].is_relative and normal
             drawn = np.expm1(math.sqrt(square) * x - square / 2.0) if positive else u * x
             errors[source][:, inputs] = drawn
         return errors

@@ -5,7 +5,8 @@ Arms with errors are rows of a batch (:mod:`cdsm.batch.solution`), each with its
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -14,14 +15,16 @@ from numpy.typing import ArrayLike
 from cdsm.batch.quantities import Codes
 from cdsm.batch.solution import Rows
 from cdsm.errors import InvalidInput
+from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.validation import Direction, flag, one_of, unit_direction
 from cdsm.support.values import Array, ReadOnlyState
-from cdsm.tension import Tension
+from cdsm.tension import Tension, distribute_tension
 from cdsm.tolerancing.inputs import Errors, Inputs, inputs_of
+from cdsm.tolerancing.rebuilt import slopes_of
 
 MeasurandName = Literal["along", "margin", "tip", "tension"]
 
@@ -111,10 +114,29 @@ class Measurand(ReadOnlyState):
             check_limits=False,
         ).solve(status, threads)[self.of]
         if self.of == "tension":
-            return found if self.cable is None else found[:, [self.cable]], status
+            found = found if self.cable is None else found[:, [self.cable]]
+            return found + self._of_rebuilt(errors), status
         found = found[:, :3, 3] @ u.T if self.of == "tip" else found.reshape(count, 1)
+        found = found + self._of_rebuilt(errors)
         status[~np.isfinite(found[:, 0]) & (status == Status.OK)] = Status.SINGULAR
         return found, status
+
+    def of_arm(self, arm: Manipulator) -> Array:
+        """Return the value of another ``arm``, at the posture and with the tensions of this one."""
+        K = self.stiffness
+        pose = arm.at(K.posture.q)
+        tension: Tension | Array = K.tension
+        if self.redistribute:
+            assert K.distribution is not None
+            bounds = K.distribution.minimum, K.distribution.maximum
+            tension = distribute_tension(pose, *bounds, K.wrench)
+        wrench = None if self.redistribute else K.wrench
+        return replace(self, stiffness=stiffness(pose, tension, wrench)).value()
+
+    def _of_rebuilt(self, errors: Errors) -> Array | float:
+        """Return what errors of sources without a formula change (N, k), to first order."""
+        rebuilt = [source for source in errors if source in self.inputs.rebuilt]
+        return sum((errors[source] @ _slopes(self, source) for source in rebuilt), 0.0)
 
     def _springs(self, errors: Errors, L: Array, F: Array, part: slice) -> Array:
         """Return stiffness with errors of springs and EA; as EA rises, ε falls: EA ε stays."""
@@ -129,6 +151,11 @@ class Measurand(ReadOnlyState):
             EA[:, of] = law.rigidity(np.clip(F[:, of], law.low, law.high))
         stretched = stretched + np.where(stretched > 0.0, change * EA, 0.0)
         return laws.stiffness_of(L, F, stretched, series)
+
+
+@lru_cache(maxsize=16)
+def _slopes(measurand: Measurand, source: str) -> Array:
+    return slopes_of(measurand.stiffness.posture.arm, source, measurand.of_arm)
 
 
 def measurand_of(
