@@ -15,10 +15,10 @@ from cdsm.errors import CdsmError, InvalidInput, listed
 from cdsm.geometry import Geometry
 from cdsm.support.format import plural
 from cdsm.support.validation import (
+    checked_quantity,
     instance,
     number_array,
     one_of,
-    quantity,
     scalar,
     sequence_of,
     text,
@@ -53,7 +53,7 @@ class Site:
         text("link", self.link)
         position = vector("position", self.position, 3, f"a point on {self.link} [m]", "length")
         for name in ("friction", "wrap"):
-            self.__dict__[name] = quantity(name, getattr(self, name), name, zero=True)
+            self.__dict__[name] = checked_quantity(name, getattr(self, name), name, zero=True)
         self.__dict__["position"] = tuple(position.tolist())
 
 
@@ -105,12 +105,14 @@ class Cable:
             checked_law(self.elasticity)
             sites = sequence_of("sites", self.sites, Site)
             one_of("control", self.control, get_args(Control))
-            lead = quantity("lead", self.lead, "length", zero=True)
-            series = quantity("series_stiffness", self.series_stiffness, "stiffness", infinite=True)
-            least = quantity("minimum", self.minimum, "tension", zero=True)
-            most = quantity("maximum", self.maximum, "tension", zero=True, infinite=True)
-            slack = quantity("slack", self.slack, "slack", zero=True)
-            gain = quantity("gain", self.gain, "gain")
+            lead = checked_quantity("lead", self.lead, "length", zero=True)
+            series = checked_quantity(
+                "series_stiffness", self.series_stiffness, "stiffness", infinite=True
+            )
+            least = checked_quantity("minimum", self.minimum, "tension", zero=True)
+            most = checked_quantity("maximum", self.maximum, "tension", zero=True, infinite=True)
+            slack = checked_quantity("slack", self.slack, "slack", zero=True)
+            gain = checked_quantity("gain", self.gain, "gain")
             if len(sites) < 2:
                 raise CdsmError(f"sites: {len(sites)} given; two or more Site are needed.")
             if least > most:

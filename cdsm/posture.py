@@ -14,7 +14,7 @@ from cdsm.errors import InvalidInput, listed
 from cdsm.geometry.parts import overlapping
 from cdsm.routing import Spans, cross
 from cdsm.segments import Segments
-from cdsm.support.format import aligned, coordinates, merged, plain
+from cdsm.support.format import aligned, coordinates, merged, prepare_json
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, ReadOnlyState, draw, frozen
@@ -90,7 +90,7 @@ class Posture(ReadOnlyState):
             "tip_rotation": self.tip[:3, :3],
             "cable_length_m": dict(zip(self.arm.cables.names, self.cable_lengths, strict=True)),
         }
-        return merged(plain(numbers), self.moment_arms.to_dict())
+        return merged(prepare_json(numbers), self.moment_arms.to_dict())
 
     @cached_property
     def moment_arms(self) -> MomentArms:

@@ -18,7 +18,7 @@ from lxml import etree
 from cdsm.errors import LINES, GeometryError, InvalidInput, listed, warn
 from cdsm.geometry import MAXIMUM_JOINTS
 from cdsm.rigid_body import RigidBody
-from cdsm.support.files import XmlFault, numbers, parse_xml, read_text
+from cdsm.support.files import XmlFault, parse_xml, read_numbers, read_text
 from cdsm.support.validation import RANGES, flag
 from cdsm.support.values import Array
 
@@ -98,7 +98,7 @@ def _number_faults(element: etree._Element) -> Iterator[str]:
             yield f"<{element.tag}> has no {key}{remedy}"
     for key in (key for key in element.attrib if key in _COUNTS):
         try:
-            values = numbers(f"{key} of <{element.tag}>", element.get(key), _COUNTS[key])
+            values = read_numbers(f"{key} of <{element.tag}>", element.get(key), _COUNTS[key])
             element.set(key, " ".join(map(repr, values)))
         except XmlFault as error:
             ends = "; a joint without ends is continuous" if element.tag == "limit" else ""

@@ -26,7 +26,7 @@ from cdsm.status import Status
 from cdsm.support.format import coordinates
 from cdsm.support.status import summary
 from cdsm.support.validation import Direction, flag, instance, unit_directions
-from cdsm.support.values import Array, Named, frozen
+from cdsm.support.values import Array, IndexedByName, frozen
 from cdsm.tension import checked_bounds
 
 DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
@@ -35,7 +35,7 @@ DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Batch(OfPostures, Named):
+class Batch(OfPostures, IndexedByName):
     """Quantities at B postures: ``batch["joint"]`` is K_θ (B, nv, nv); ``len(batch)`` is B.
 
     The keys are the names in :attr:`outputs`; ``"joint" in batch``, ``list(batch)`` and

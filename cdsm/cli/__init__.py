@@ -8,17 +8,18 @@ from __future__ import annotations
 import inspect
 import io
 import sys
+from collections.abc import Callable
 from typing import Annotated
 
 import typer
 
 import cdsm
 from cdsm.cli.arm import export, new, view
-from cdsm.cli.identify import fit, identify, reproduce
+from cdsm.cli.identify import fit, identify_parameters, reproduce
 from cdsm.cli.options import opt
 from cdsm.cli.output import debug_wanted, reported
-from cdsm.cli.plan import design, plan, sweep
-from cdsm.cli.stiffness import buckle, stiffness, weigh
+from cdsm.cli.plan import design, plan, sweep_postures
+from cdsm.cli.stiffness import buckle, show_stiffness, weigh
 
 app = typer.Typer(
     name="cdsm",
@@ -52,8 +53,20 @@ def main(
             stream.reconfigure(errors="replace")
 
 
-for command in (
-    *(new, stiffness, weigh, buckle, plan, sweep, design),
-    *(view, fit, identify, export, reproduce),
-):
-    app.command(command.__name__, help=inspect.getdoc(command))(reported(command))
+COMMANDS: dict[str, Callable[..., int]] = {
+    "new": new,
+    "stiffness": show_stiffness,
+    "weigh": weigh,
+    "buckle": buckle,
+    "plan": plan,
+    "sweep": sweep_postures,
+    "design": design,
+    "view": view,
+    "fit": fit,
+    "identify": identify_parameters,
+    "export": export,
+    "reproduce": reproduce,
+}
+
+for name, command in COMMANDS.items():
+    app.command(name, help=inspect.getdoc(command))(reported(command))

@@ -15,7 +15,7 @@ from cdsm.cli import options
 from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse
 
-Kind = Literal["universal", "hinged"]
+JointType = Literal["universal", "hinged"]
 
 _JOINTS = (
     "Number of joints, default 4; several: of sections, each a quarter narrower than the last."
@@ -30,7 +30,7 @@ def new(
     arm: Annotated[Path, file_opt("File to write.", "ARM.toml", declare=typer.Argument)],
     joints: Annotated[str | None, opt(_JOINTS, "N[,N,...]")] = None,
     kind: Annotated[
-        Kind, opt("Joints: universal, or hinges 90 degrees apart.", None, "--type")
+        JointType, opt("Joints: universal, or hinges 90 degrees apart.", None, "--type")
     ] = "universal",
     wire: Annotated[str | None, opt(_WIRE, "NAME|EA|WIRE.toml")] = None,
     source: Annotated[Path | None, opt(_FROM, "ROBOT.urdf|FOLDER", "--from")] = None,
@@ -38,7 +38,7 @@ def new(
     tip: Annotated[str | None, opt("Link of the robot that is the tip.", "LINK")] = None,
     no_check_inertia: Annotated[bool, opt(_INERTIA, None, "--no-check-inertia")] = False,
     overwrite: Annotated[bool, opt("Replace the file.", None, "--overwrite")] = False,
-    as_json: options.AsJson = False,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Write a complete ARM.toml with a comment on every key.
 
@@ -148,18 +148,18 @@ def _serpentine(
 
 
 def export(
-    arm: options.Arm,
+    arm: options.ArmArgument,
     out: Annotated[
         Path,
         file_opt("URDF, or MuJoCo model under tension.", "OUT.urdf|xml", declare=typer.Argument),
     ],
-    changes: options.Changes = None,
-    angles: options.Angles = None,
-    minimum: options.Minimum = 0.0,
+    changes: options.SetOption = None,
+    angles: options.AnglesOption = None,
+    minimum: options.MinimumOption = 0.0,
     actuators: Annotated[
         Literal["length", "tension", "none"], opt("What motors of a MuJoCo model control.")
     ] = "length",
-    as_json: options.AsJson = False,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Write the URDF of an arm, or a MuJoCo model at a posture.
 
@@ -194,19 +194,19 @@ def export(
 
 
 def view(
-    arm: options.Arm,
-    changes: options.Changes = None,
-    angles: options.Angles = None,
-    path: options.PathFile = None,
-    minimum: options.Minimum = 0.0,
-    load: options.Load = None,
+    arm: options.ArmArgument,
+    changes: options.SetOption = None,
+    angles: options.AnglesOption = None,
+    path: options.PathOption = None,
+    minimum: options.MinimumOption = 0.0,
+    load: options.LoadOption = None,
     port: Annotated[int, opt("Port to listen at, default 8080; 0 for any.", "N")] = 8080,
-    as_json: options.AsJson = False,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Show an arm in the browser, with sliders, and its stiffness."""
     with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the view, also while it starts
-        robot = options.read(arm, changes)
-        start = None if angles is None else options.coordinates(angles, robot)
+        robot = options.read_arm(arm, changes)
+        start = None if angles is None else options.joint_coordinates(angles, robot)
         force = options.load_at_tip(robot, load)
         if force[3:].any():
             raise misuse("--load", "has a moment, but the view has forces only: FX,FY,FZ.")

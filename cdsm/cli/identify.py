@@ -12,7 +12,7 @@ import typer
 
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import AsJson, Figure, file_opt, opt
+from cdsm.cli.options import FigureOption, JsonOption, file_opt, opt
 from cdsm.cli.output import answer, misuse, write, write_picture
 
 
@@ -27,8 +27,8 @@ def fit(
     out: Annotated[
         Path | None, file_opt("Law, for wire= in ARM.toml.", "FILE.toml", "--out")
     ] = None,
-    figure: Figure = None,
-    as_json: AsJson = False,
+    figure: FigureOption = None,
+    as_json: JsonOption = False,
 ) -> int:
     """Fit the law EA(F) of a wire to its tensile test.
 
@@ -37,7 +37,7 @@ def fit(
     """
     limits = [-math.inf, math.inf]
     if between is not None:
-        limits = options.numbers("--between", between, (2,), "LOW,HIGH in N")
+        limits = options.parse_numbers("--between", between, (2,), "LOW,HIGH in N")
     data = cdsm.read_tensile_csv(
         test,
         columns=_pair("--columns", columns),
@@ -69,7 +69,7 @@ def _pair(option: str, text: str | None) -> list[str] | None:
     return entries
 
 
-Range = tuple[float, float]
+Bounds = tuple[float, float]
 
 _LOOPS = "A line per reading. Columns: test; joints [deg]; direction (such as -z); force [N]; "
 _LOOPS += "displacement [mm] along it (or x, y, z); minimum [N], or a tension per cable [N]."
@@ -79,18 +79,18 @@ _FREE += "bending_stiffness [N m/rad, N m²]. Default bounds: half to "
 _FREE += "twice the arm's own value; friction 0 to 1."
 
 
-def identify(
-    arm: options.Arm,
+def identify_parameters(
+    arm: options.ArmArgument,
     loops: Annotated[Path, typer.Argument(metavar="LOOPS.csv", help=_LOOPS)],
     free: Annotated[list[str], opt(_FREE, "NAME[@JOINT][=LOW:HIGH]")],
     displacement_std: Annotated[float, opt("Standard deviation of a reading.", "MM")],
-    changes: options.Changes = None,
+    changes: options.SetOption = None,
     minimum: Annotated[float | None, opt("Least tension, if not in LOOPS.csv.", "N")] = None,
     tests: Annotated[
         int | None, opt("Plan the best N tests of LOOPS.csv instead.", "N", min=1)
     ] = None,
-    figure: options.Figure = None,
-    as_json: options.AsJson = False,
+    figure: options.FigureOption = None,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Find friction, rigidity and dimensions from weight tests.
 
@@ -100,7 +100,7 @@ def identify(
     from cdsm.arm_parameters import ArmParameters
     from cdsm.identification.experiment_plan import plan_tests
 
-    described = options.read(arm, changes)
+    described = options.read_arm(arm, changes)
     ranges = _ranges(free)
     for name in ranges:
         if name.partition("@")[0] in ("slack", "gain"):
@@ -132,20 +132,22 @@ def identify(
     return answer(as_json, found.to_dict(), found, warnings=found.warnings)
 
 
-def _ranges(free: list[str]) -> dict[str, Range | None]:
+def _ranges(free: list[str]) -> dict[str, Bounds | None]:
     """Return the bounds of each parameter of --free, by name and in its unit; None: the usual."""
-    ranges: dict[str, Range | None] = {}
+    ranges: dict[str, Bounds | None] = {}
     for each in free:
         name, equals, given = each.partition("=")
         if name in ranges:
             raise misuse("--free", f"{name} is given twice.")
         form = "NAME=LOW:HIGH, such as friction=0:0.5"
-        found = options.numbers("--free", given.replace(":", ","), (2,), form) if equals else None
+        found = (
+            options.parse_numbers("--free", given.replace(":", ","), (2,), form) if equals else None
+        )
         ranges[name] = (found[0], found[1]) if found else None
     return ranges
 
 
-def _usual(name: str, value: float) -> Range:
+def _usual(name: str, value: float) -> Bounds:
     """Return the default bounds of a parameter of this value: friction 0 to 1, else ½ to twice."""
     if name.partition("@")[0] == "friction":
         return 0.0, 1.0
@@ -157,7 +159,7 @@ def _usual(name: str, value: float) -> Range:
 def reproduce(
     out: Annotated[Path, opt("Folder; default: reproduction.", "FOLDER")] = Path("reproduction"),
     kind: Annotated[Literal["pdf", "svg", "png"], opt("Of the figures.", None, "--format")] = "png",
-    as_json: AsJson = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Recompute the figures and numbers of the paper.
 

@@ -53,23 +53,31 @@ OF_JOINTS += "others 0."
 _PATH = "Path, a line per sample. Columns such as joint1_1 [deg] (mm where they slide; others 0), "
 _PATH += "or x [mm], y [mm], z [mm] of the tip; for plans also target [N/mm]."
 
-Arm = Annotated[Path, typer.Argument(metavar="ARM.toml", help="The arm; `cdsm new` writes one.")]
-Changes = Annotated[list[str] | None, opt(_SET, "KEY=VALUE", "--set")]
-Angles = Annotated[str | None, opt(_ANGLES, "DEG,...")]
-PathFile = Annotated[Path | None, opt(_PATH, "PATH.csv", "--path")]
+ArmArgument = Annotated[
+    Path, typer.Argument(metavar="ARM.toml", help="The arm; `cdsm new` writes one.")
+]
+SetOption = Annotated[list[str] | None, opt(_SET, "KEY=VALUE", "--set")]
+AnglesOption = Annotated[str | None, opt(_ANGLES, "DEG,...")]
+PathOption = Annotated[Path | None, opt(_PATH, "PATH.csv", "--path")]
 _PULL = "Wire [mm] that each motor takes in, from straight cables at the rest of the springs."
-Held = Annotated[
+TensionOption = Annotated[
     str | None, opt("Tension [N] that each motor holds; the posture follows.", "N,...", "--tension")
 ]
-Pull = Annotated[str | None, opt(_PULL, "MM,...")]
-Minimum = Annotated[float, opt("Lower bound of all tensions [N], besides those of ARM.toml.", "N")]
-Maximum = Annotated[float, opt("Upper bound of all tensions [N], besides those of ARM.toml.", "N")]
-Load = Annotated[
+PullOption = Annotated[str | None, opt(_PULL, "MM,...")]
+MinimumOption = Annotated[
+    float, opt("Lower bound of all tensions [N], besides those of ARM.toml.", "N")
+]
+MaximumOption = Annotated[
+    float, opt("Upper bound of all tensions [N], besides those of ARM.toml.", "N")
+]
+LoadOption = Annotated[
     str | None, opt("Force [N], moment [N m] at the tip, base axes.", "FX,FY,FZ[,MX,MY,MZ]")
 ]
-Mass = Annotated[float | None, opt("Mass that hangs at the tip; adds to --load.", "KG", min=0.0)]
-Figure = Annotated[Path | None, file_opt("Figure to write.", "FILE.pdf|svg|png", "--figure")]
-AsJson = Annotated[bool, opt("Print answer (SI) and errors as JSON.", None, "--json")]
+MassOption = Annotated[
+    float | None, opt("Mass that hangs at the tip; adds to --load.", "KG", min=0.0)
+]
+FigureOption = Annotated[Path | None, file_opt("Figure to write.", "FILE.pdf|svg|png", "--figure")]
+JsonOption = Annotated[bool, opt("Print answer (SI) and errors as JSON.", None, "--json")]
 
 
 def changes_of(texts: Iterable[str] | None) -> dict[str, Any]:
@@ -90,15 +98,15 @@ def changes_of(texts: Iterable[str] | None) -> dict[str, Any]:
     return changes
 
 
-def read(arm: Path, changes: Iterable[str] | None) -> cdsm.Manipulator:
+def read_arm(arm: Path, changes: Iterable[str] | None) -> cdsm.Manipulator:
     """Read an arm, with the changes of --set."""
     return cdsm.Manipulator.read(arm, changes=changes_of(changes))
 
 
 def posture(arm: Path, changes: Iterable[str] | None, angles: str | None) -> cdsm.Posture:
     """Read an arm and return its posture at --angles."""
-    found = read(arm, changes)
-    return found.at(coordinates(angles, found))
+    found = read_arm(arm, changes)
+    return found.at(joint_coordinates(angles, found))
 
 
 def load_at_tip(arm: cdsm.Manipulator, load: str | None, mass: float | None = None) -> Array:
@@ -108,7 +116,7 @@ def load_at_tip(arm: cdsm.Manipulator, load: str | None, mass: float | None = No
     from cdsm.support.validation import number_array
 
     form = "FX,FY,FZ or FX,FY,FZ,MX,MY,MZ"
-    given = [0.0] * 6 if load is None else numbers("--load", load, (3, 6), form)
+    given = [0.0] * 6 if load is None else parse_numbers("--load", load, (3, 6), form)
     wrench = np.zeros(6)
     wrench[: len(given)] = number_array("--load", given, "force")
     if mass and not arm.gravity.any():
@@ -126,7 +134,7 @@ def joint_scales(arm: cdsm.Manipulator) -> Array:
     return np.array([scale for _, scale in JointUnits(arm.slides).shown])
 
 
-def coordinates(text: str | None, arm: cdsm.Manipulator) -> Array:
+def joint_coordinates(text: str | None, arm: cdsm.Manipulator) -> Array:
     """Return the joint coordinates of --angles (nv,) in SI; 0 without this option."""
     from cdsm.support.validation import scalar
 
@@ -134,11 +142,13 @@ def coordinates(text: str | None, arm: cdsm.Manipulator) -> Array:
     form = "an angle"
     if text is not None and "=" in text:
         named = by_joint("--angles", text, arm, "JOINT=DEG,...")
-        each = {name: numbers("--angles", value, (1,), form)[0] for name, value in named.items()}
+        each = {
+            name: parse_numbers("--angles", value, (1,), form)[0] for name, value in named.items()
+        }
         given = [each.get(name, 0.0) for name in names]
     else:
         form = f"one angle, one for each of {', '.join(names)}, or some by name: {names[-1]}=10"
-        given = numbers("--angles", "0" if text is None else text, (1, arm.nv), form)
+        given = parse_numbers("--angles", "0" if text is None else text, (1, arm.nv), form)
     pairs = zip(names, given * arm.nv if len(given) == 1 else given, strict=True)
     return joint_scales(arm) * [scalar(f"--angles of {name}", each) for name, each in pairs]
 
@@ -158,14 +168,18 @@ def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[s
     return values
 
 
-def direction_of(text: str) -> Sequence[float]:
+def parse_direction(text: str) -> Sequence[float]:
     """Return the direction (3,) of --direction: an axis, or three numbers."""
     from cdsm.support.validation import AXES
 
-    return AXES.get(text) or numbers("--direction", text, (3,), "an axis such as -y, or X,Y,Z")
+    return AXES.get(text) or parse_numbers(
+        "--direction", text, (3,), "an axis such as -y, or X,Y,Z"
+    )
 
 
-def numbers(option: str, text: str, counts: Sequence[int] = (), form: str = "N,...") -> list[float]:
+def parse_numbers(
+    option: str, text: str, counts: Sequence[int] = (), form: str = "N,..."
+) -> list[float]:
     """Return the numbers in the text of an option; ``form`` is for the message."""
     try:
         values = [float(word) for word in text.split(",")]

@@ -60,9 +60,9 @@ def answer(as_json: bool, numbers: Json, *parts: object, warnings: Iterable[str]
 
 def print_json(numbers: Json) -> None:
     """Print numbers, arrays and results as strict JSON."""
-    from cdsm.support.format import plain
+    from cdsm.support.format import prepare_json
 
-    typer.echo(json.dumps(plain(numbers), indent=1, allow_nan=False, default=str))
+    typer.echo(json.dumps(prepare_json(numbers), indent=1, allow_nan=False, default=str))
 
 
 def header(

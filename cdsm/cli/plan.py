@@ -10,7 +10,7 @@ import typer
 
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import AsJson, file_opt, opt
+from cdsm.cli.options import JsonOption, file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
 
 if TYPE_CHECKING:
@@ -19,20 +19,20 @@ if TYPE_CHECKING:
 
 
 def plan(
-    arm: options.Arm,
+    arm: options.ArmArgument,
     direction: Annotated[str, opt("Direction of the stiffness, such as -y.", "AXIS|X,Y,Z")],
-    changes: options.Changes = None,
+    changes: options.SetOption = None,
     target: Annotated[float | None, opt("Wanted stiffness.", "N/mm", min=0.0)] = None,
-    angles: options.Angles = None,
-    path: options.PathFile = None,
+    angles: options.AnglesOption = None,
+    path: options.PathOption = None,
     max_change_per_sample: Annotated[float, opt("Of a tension, along --path.", "N")] = math.inf,
-    minimum: options.Minimum = 0.0,
-    maximum: options.Maximum = math.inf,
-    load: options.Load = None,
-    mass: options.Mass = None,
+    minimum: options.MinimumOption = 0.0,
+    maximum: options.MaximumOption = math.inf,
+    load: options.LoadOption = None,
+    mass: options.MassOption = None,
     out: Annotated[Path | None, file_opt("Tensions and lengths.", "FILE.csv", "--out")] = None,
-    figure: options.Figure = None,
-    as_json: options.AsJson = False,
+    figure: options.FigureOption = None,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Find the least tensions that give a wanted stiffness.
 
@@ -41,7 +41,7 @@ def plan(
     Exit code 0; 3 if no tensions reach the target at the posture, or at some samples of the path.
     The plan of the other samples is still written.
     """
-    u = options.direction_of(direction)
+    u = options.parse_direction(direction)
     wanted = None if target is None else 1e3 * target
     if path is None:
         if wanted is None:
@@ -62,7 +62,7 @@ def plan(
 
     if angles is not None:
         raise misuse("--angles", "is of one posture; --path has its own.")
-    robot = options.read(arm, changes)
+    robot = options.read_arm(arm, changes)
     file = options.read_path(path, robot)
     planned = cdsm.plan_path(
         robot,
@@ -99,23 +99,23 @@ _OUTPUTS = "Quantities of the table, such as along, tension, margin, softest, st
 _OUTPUTS += "tip_position, cable_lengths, payload, force_radius, tension_factor, disk_clearance."
 
 
-def sweep(
-    arm: options.Arm,
+def sweep_postures(
+    arm: options.ArmArgument,
     out: Annotated[Path | None, file_opt("Table to write, SI.", "FILE.nc|csv", "--out")] = None,
-    changes: options.Changes = None,
+    changes: options.SetOption = None,
     grid: Annotated[str | None, opt(_GRID, "JOINT=LOW:HIGH:N,...")] = None,
     path: Annotated[Path | None, opt(options.OF_JOINTS, "PATH.csv")] = None,
     random: Annotated[int | None, opt("Sobol points within the joint limits.", "N", min=1)] = None,
     minimum: Annotated[str, opt("Lower bounds of all tensions [N], a case each.", "N,...")] = "0",
-    maximum: options.Maximum = math.inf,
-    load: options.Load = None,
+    maximum: options.MaximumOption = math.inf,
+    load: options.LoadOption = None,
     outputs: Annotated[str | None, opt(_OUTPUTS, "NAME,...")] = None,
     store: Annotated[
         Path | None, opt("Keeps what is done; a stopped sweep resumes.", "FOLDER")
     ] = None,
-    figure: options.Figure = None,
+    figure: options.FigureOption = None,
     quantity: Annotated[str, opt("Colour of the workspace in --figure.", "NAME")] = "softest",
-    as_json: options.AsJson = False,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Compute the stiffness over many postures; write a table, a map.
 
@@ -132,8 +132,8 @@ def sweep(
     from cdsm.sweeps.dataset import read_into_memory
     from cdsm.sweeps.sweep import write_sweep
 
-    robot = options.read(arm, changes)
-    low = options.numbers("--minimum", minimum)
+    robot = options.read_arm(arm, changes)
+    low = options.parse_numbers("--minimum", minimum)
     names = [*DEFAULT] if outputs is None else [name.strip() for name in outputs.split(",")]
     if figure is not None:
         names = [*dict.fromkeys([*names, "tip_position", quantity])]
@@ -192,7 +192,7 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
     rest: dict[str, float] = {}
     form = "JOINT=LOW:HIGH:N or JOINT=ANGLE"
     for name, value in options.by_joint("--grid", text, arm, form).items():
-        given = options.numbers("--grid", value.replace(":", ","), (1, 3), form)
+        given = options.parse_numbers("--grid", value.replace(":", ","), (1, 3), form)
         if len(given) == 1:
             rest[name] = units[name] * given[0]
             continue
@@ -218,7 +218,7 @@ def design(
     ],
     out: Annotated[Path, opt("Folder for the results.", "FOLDER")],
     choose: Annotated[int | None, opt(_CHOOSE, "N", min=0)] = None,
-    as_json: AsJson = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Find the best designs of an arm, and write the chosen one.
 

@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from cdsm.tolerancing.budget import Uncertainty
 
 
-def stiffness(
-    arm: options.Arm,
-    changes: options.Changes = None,
-    angles: options.Angles = None,
-    minimum: options.Minimum = 0.0,
-    maximum: options.Maximum = math.inf,
-    tension: options.Held = None,
-    pull: options.Pull = None,
-    load: options.Load = None,
-    mass: options.Mass = None,
+def show_stiffness(
+    arm: options.ArmArgument,
+    changes: options.SetOption = None,
+    angles: options.AnglesOption = None,
+    minimum: options.MinimumOption = 0.0,
+    maximum: options.MaximumOption = math.inf,
+    tension: options.TensionOption = None,
+    pull: options.PullOption = None,
+    load: options.LoadOption = None,
+    mass: options.MassOption = None,
     direction: Annotated[str | None, opt("One more direction for it.", "AXIS|X,Y,Z")] = None,
     check: Annotated[
         bool, opt("Print a report: right, in balance, stable?", None, "--check")
@@ -41,7 +41,7 @@ def stiffness(
     out: Annotated[
         Path | None, file_opt("Page of the report to write.", "FILE.html", "--out")
     ] = None,
-    as_json: options.AsJson = False,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Compute the least tensions at a posture, and the stiffness.
 
@@ -53,14 +53,14 @@ def stiffness(
     """
     from cdsm.support.files import write_text
 
-    robot = options.read(arm, changes)
+    robot = options.read_arm(arm, changes)
     wrench = options.load_at_tip(robot, load, mass)
     K, rest = _balanced(robot, wrench, angles, minimum, maximum, tension, pull)
     head, numbers = header(K.posture, [] if rest else [minimum])
-    axes = {axis: options.direction_of(axis) for axis in ("x", "y", "z")}
+    axes = {axis: options.parse_direction(axis) for axis in ("x", "y", "z")}
     lines = list[str]()
     if direction is not None:
-        axes[direction] = u = options.direction_of(direction)
+        axes[direction] = u = options.parse_direction(direction)
         k = (rest or K).along(u)
         numbers |= {"direction": u, "along_direction_N_per_m": k}
         lines.append(f"along {direction}: {k / 1e3:.4g} N/mm")
@@ -95,14 +95,14 @@ def _balanced(
 ) -> tuple[cdsm.Stiffness, Equilibrium | None]:
     """Return K at --angles, or K and the equilibrium where --tension or --pull let the arm rest."""
     if tension is None and pull is None:
-        pose = arm.at(options.coordinates(angles, arm))
+        pose = arm.at(options.joint_coordinates(angles, arm))
         return cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum, maximum, wrench)), None
     if None not in (tension, pull) or (angles, minimum, maximum) != (None, 0.0, math.inf):
         said = "say what the motors do, and the posture follows: give one of them, without "
         raise misuse("--tension, --pull", f"{said}--angles, --minimum and --maximum.")
     option, text = ("--tension", tension) if pull is None else ("--pull", pull)
     form = f"one for each cable: {', '.join(arm.cables.names)}"
-    values = options.numbers(option, text or "", (len(arm.cables),), form)
+    values = options.parse_numbers(option, text or "", (len(arm.cables),), form)
     if pull is None:
         rest = cdsm.forward_statics(arm, tension=values, wrench=wrench)
     else:
@@ -165,20 +165,20 @@ def _uncertainty(
 
 
 def weigh(
-    arm: options.Arm,
-    changes: options.Changes = None,
-    angles: options.Angles = None,
-    minimum: options.Minimum = 0.0,
-    maximum: options.Maximum = math.inf,
-    tension: options.Held = None,
-    pull: options.Pull = None,
-    load: options.Load = None,
-    mass: options.Mass = None,
+    arm: options.ArmArgument,
+    changes: options.SetOption = None,
+    angles: options.AnglesOption = None,
+    minimum: options.MinimumOption = 0.0,
+    maximum: options.MaximumOption = math.inf,
+    tension: options.TensionOption = None,
+    pull: options.PullOption = None,
+    load: options.LoadOption = None,
+    mass: options.MassOption = None,
     steps: Annotated[int | None, opt("Steps to the full load.", "N", min=1, max=1000)] = None,
     cycles: Annotated[int | None, opt("Load and unload N times.", "N", min=1, max=100)] = None,
     out: Annotated[Path | None, file_opt("Table of --cycles.", "FILE.nc|csv", "--out")] = None,
-    figure: options.Figure = None,
-    as_json: options.AsJson = False,
+    figure: options.FigureOption = None,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Hang a weight at the tip, and find how far it moves.
 
@@ -192,7 +192,7 @@ def weigh(
     """
     if out is not None and cycles is None:
         raise misuse("--out", "is the table of --cycles; give both.")
-    robot = options.read(arm, changes)
+    robot = options.read_arm(arm, changes)
     weight = _weight(robot, load, mass)
     K, rest = _balanced(robot, [0.0] * 6, angles, minimum, maximum, tension, pull)
     pose = K.posture
@@ -256,15 +256,15 @@ def _cycles(
 
 
 def buckle(
-    arm: options.Arm,
-    changes: options.Changes = None,
-    angles: options.Angles = None,
-    minimum: options.Minimum = 0.0,
-    maximum: options.Maximum = math.inf,
-    load: options.Load = None,
-    mass: options.Mass = None,
-    figure: options.Figure = None,
-    as_json: options.AsJson = False,
+    arm: options.ArmArgument,
+    changes: options.SetOption = None,
+    angles: options.AnglesOption = None,
+    minimum: options.MinimumOption = 0.0,
+    maximum: options.MaximumOption = math.inf,
+    load: options.LoadOption = None,
+    mass: options.MassOption = None,
+    figure: options.FigureOption = None,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Find the tension and the load at which the arm buckles.
 

@@ -23,7 +23,7 @@ from cdsm.statics.equilibrium import equilibrium
 from cdsm.statics.quasi_static import Load, QuasiStaticArm
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.validation import instance, quantity, scalar, whole_number
+from cdsm.support.validation import checked_quantity, instance, scalar, whole_number
 from cdsm.support.values import Array, frozen
 
 _TANGENTS: Final = 10  # number of updates of the motors' tangents and of the load per step
@@ -193,7 +193,7 @@ class MuJoCoPlant:
     def __post_init__(self) -> None:
         need("mujoco", "mujoco")
         instance("arm", self.arm, Manipulator)
-        quantity("period", self.period, "time")
+        checked_quantity("period", self.period, "time")
         if scalar("damping_ratio", self.damping_ratio) < 0.0:
             raise InvalidInput("damping_ratio", f"{self.damping_ratio:g} given; 0 or more needed.")
         if self.arm.has_friction:

@@ -26,7 +26,7 @@ from cdsm.errors import InvalidInput
 from cdsm.friction.capstan import ChainProblem
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.support.validation import quantity, scalar, whole_number
+from cdsm.support.validation import checked_quantity, scalar, whole_number
 from cdsm.support.values import Array
 from cdsm.tension import grip
 
@@ -79,7 +79,7 @@ class Sensors:
     def __post_init__(self) -> None:
         if not scalar("encoder", self.encoder) >= 0.0:
             raise InvalidInput("encoder", f"{self.encoder:g} m given; 0 or more is needed.")
-        quantity("tension_noise", self.tension_noise, "force", zero=True)
+        checked_quantity("tension_noise", self.tension_noise, "force", zero=True)
         scalar("tension_bias", self.tension_bias)
         whole_number("delay", self.delay, 0)
         whole_number("seed", self.seed, 0)

@@ -36,7 +36,7 @@ from cdsm.planning.path_plan import PathPlan
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.support.progress import show_progress
-from cdsm.support.validation import instance, one_of, quantity, whole_number
+from cdsm.support.validation import checked_quantity, instance, one_of, whole_number
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 
@@ -121,7 +121,7 @@ def track(
     count = whole_number("steps", steps, 1, _MOST_STEPS)
     change = checked_change("max_change_per_step", arm, max_change_per_step)
     outer = StiffnessLoop(plan, low, high, change) if name == "stiffness" else None
-    hung = quantity("payload", payload, "mass", zero=True) * arm.gravity
+    hung = checked_quantity("payload", payload, "mass", zero=True) * arm.gravity
     schedule = _schedule(plan, count, hung)
     rows: list[dict[str, Any]] = []
     outcome, reason = _follow(plan, command_of, plant, sensors, schedule, outer, (low, high), rows)
@@ -129,7 +129,7 @@ def track(
         plan=plan,
         law=name,
         plant=plant,
-        period=quantity("period", period, "time"),
+        period=checked_quantity("period", period, "time"),
         steps=count,
         max_change_per_step=change,
         replan_failed=outer.failed if outer else {},

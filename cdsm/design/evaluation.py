@@ -24,13 +24,13 @@ from cdsm.support.format import plural
 from cdsm.support.progress import progress_bar
 from cdsm.support.tables import csv_text
 from cdsm.support.validation import instance, number_array, whole_number
-from cdsm.support.values import Array, Named, ReadOnlyState, frozen
+from cdsm.support.values import Array, IndexedByName, ReadOnlyState, frozen
 from cdsm.tension import distribute_tension
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Designs(ReadOnlyState, Named):
+class Designs(ReadOnlyState, IndexedByName):
     """Designs of a problem with all their quantities; made by :func:`evaluate_designs`.
 
     Attributes:

@@ -21,7 +21,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.parameters import PARAMETERS
 from cdsm.support.format import plural
 from cdsm.support.validation import NO_WRENCH, instance, number_array, sequence_of
-from cdsm.support.values import Array, Given, ReadOnlyState, frozen
+from cdsm.support.values import Array, Converted, ReadOnlyState, frozen
 from cdsm.sweeps.cases import require
 from cdsm.sweeps.poses import PoseSet, joint_angles
 from cdsm.tension import checked_bounds
@@ -66,7 +66,7 @@ class DesignProblem(ReadOnlyState):
     objectives: Sequence[Objective]
     postures: PoseSet | ArrayLike
     constraints: Sequence[Constraint] = ()
-    loads: Given[ArrayLike, Array] = NO_WRENCH  # type: ignore[assignment]
+    loads: Converted[ArrayLike, Array] = NO_WRENCH  # type: ignore[assignment]
     minimum: float = 0.0
     maximum: float = math.inf
     worst_friction: bool = False

@@ -18,7 +18,7 @@ from cdsm.design.problem import DesignProblem
 from cdsm.interchange.mjcf import write_mjcf
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import make_folder, write_text
-from cdsm.support.format import aligned, plain, plural
+from cdsm.support.format import aligned, plural, prepare_json
 from cdsm.support.result import data_frame
 from cdsm.support.tables import csv_text
 from cdsm.support.validation import whole_number
@@ -139,7 +139,7 @@ class DesignSearch(ReadOnlyState, Plotted):
             "compromise": self.compromise,
             "front": self.best.columns(),
         }
-        return plain(numbers)
+        return prepare_json(numbers)
 
     def __repr__(self) -> str:
         return f"<DesignSearch: {plural(len(self.front), 'design')} on the front>"

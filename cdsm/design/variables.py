@@ -18,11 +18,11 @@ from cdsm.parameters import NEWTON, NUMBER, PARAMETERS, Unit
 from cdsm.support.format import place
 from cdsm.support.validation import (
     WIDEST,
+    checked_quantity,
     doubts_about_angle,
     doubts_about_units,
     instance,
     one_of,
-    quantity,
     scalar,
     whole_number,
 )
@@ -93,7 +93,9 @@ class Variable:
             raise InvalidInput(self.of, "needs both low and high.")
         kind = self._unit.quantity
         low, high = (
-            scalar(self.of, end) if kind is None else quantity(self.of, end, kind, zero=True)
+            scalar(self.of, end)
+            if kind is None
+            else checked_quantity(self.of, end, kind, zero=True)
             for end in (self.low, self.high)
         )
         if not low < high:

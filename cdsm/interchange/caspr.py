@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from cdsm.cable import Cable, Site
 from cdsm.errors import FileError, InvalidInput, unknown
 from cdsm.manipulator import GRAVITY, Manipulator
-from cdsm.support.files import XmlFault, as_path, numbers, parse_xml, read_text
+from cdsm.support.files import XmlFault, as_path, parse_xml, read_numbers, read_text
 from cdsm.support.validation import AXES
 from cdsm.support.values import Array
 from cdsm.urdf import TIP, E, inertial, joint, origin, urdf_text
@@ -137,7 +137,7 @@ def _reading(path: Path) -> Iterator[Callable[[str, str], etree._Element]]:
 
 
 def _whole(where: str, text: str | None, most: int) -> int:
-    (value,) = numbers(where, text, 1)
+    (value,) = read_numbers(where, text, 1)
     if value not in range(most + 1):
         raise XmlFault(f"{where} is link {value:g}; one of 0 to {most} is needed")
     return int(value)
@@ -171,7 +171,7 @@ def _body(
 
     def values(path: str, count: int = 3) -> Array:
         where = f"{name}: <{path.rpartition('/')[2]}>"
-        return np.array(numbers(where, element.findtext(path), count))
+        return np.array(read_numbers(where, element.findtext(path), count))
 
     body = "physical/inertia"
     kind = element.find("joint")
@@ -212,14 +212,15 @@ def _joints(name: str, element: etree._Element) -> list[tuple[str, str, Any, Any
     """Split a CASPR joint into joints of one coordinate, in the order of its coordinates."""
     axes = _JOINTS[str(element.get("type"))]
     low, high = (
-        numbers(f"{name}: joint {key}", element.get(key), len(axes)) for key in ("q_min", "q_max")
+        read_numbers(f"{name}: joint {key}", element.get(key), len(axes))
+        for key in ("q_min", "q_max")
     )
     found = []
     for axis, lower, upper in zip(axes, low, high, strict=True):
         if lower > upper:
             raise XmlFault(f"{name}: joint q_min {lower:g} is above q_max {upper:g}")
         tail = {"?": "turn", "!": "slide"}.get(axis, f"slide_{axis.lower()}" * axis.isupper())
-        xyz = AXES.get(axis.lower()) or numbers(f"{name}: joint axis", element.get("axis"), 3)
+        xyz = AXES.get(axis.lower()) or read_numbers(f"{name}: joint axis", element.get("axis"), 3)
         kind = "prismatic" if axis in "XYZ!" else "revolute"
         limit = E.limit(effort=0.0, velocity=0.0, lower=lower, upper=upper)
         found.append((kind, f"{name}_{tail or axis}", E.axis(xyz=xyz), limit))
@@ -254,7 +255,7 @@ def _cable(element: etree._Element, name: str, links: list[_Link], elasticity: E
     if reference not in ("com", "joint"):
         raise XmlFault(f"{name}: attachment_reference {reference!r}; com or joint is needed")
     low, high = (
-        numbers(f"{name}: <{key}>", element.findtext(f"properties/{key}"), 1)[0]
+        read_numbers(f"{name}: <{key}>", element.findtext(f"properties/{key}"), 1)[0]
         for key in ("force_min", "force_max")
     )
     sites = []
@@ -262,7 +263,7 @@ def _cable(element: etree._Element, name: str, links: list[_Link], elasticity: E
         if place.tag != "attachment":
             raise XmlFault(f"{name}: <{place.tag}> is not supported; a cable passes points only")
         link = links[_whole(f"{name}: <link>", place.findtext("link"), len(links) - 1)]
-        point = np.array(numbers(f"{name}: <location>", place.findtext("location"), 3))
+        point = np.array(read_numbers(f"{name}: <location>", place.findtext("location"), 3))
         point = point + link.centre if reference == "com" else point
         sites.append(Site(link.name, tuple(point.tolist())))
     high = high if high > 0.0 else math.inf

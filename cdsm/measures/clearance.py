@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cdsm.posture import Posture
 from cdsm.support.result import Result, unit
-from cdsm.support.validation import instance, quantity
+from cdsm.support.validation import checked_quantity, instance
 from cdsm.support.values import Array
 from cdsm.urdf import backbone_radius
 
@@ -88,8 +88,8 @@ def clearance(pose: Posture, diameter: float = 0.0, thickness: float = 0.0) -> C
     Raises:
         InvalidInput: ``diameter`` or ``thickness`` is negative or not a length.
     """
-    d = quantity("diameter", diameter, "diameter", zero=True)
-    t = quantity("thickness", thickness, "length", zero=True)
+    d = checked_quantity("diameter", diameter, "diameter", zero=True)
+    t = checked_quantity("thickness", thickness, "length", zero=True)
     found = distances(instance("pose", pose, Posture), d, t)
     cables, links, disks = (found[kind][0] for kind in KINDS)
     return Clearance(

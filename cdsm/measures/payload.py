@@ -15,8 +15,14 @@ from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import NO_WRENCH, Direction, instance, unit_direction, wrench_vector
-from cdsm.support.validation import quantity as checked
+from cdsm.support.validation import (
+    NO_WRENCH,
+    Direction,
+    checked_quantity,
+    instance,
+    unit_direction,
+    wrench_vector,
+)
 from cdsm.support.values import Array, frozen
 from cdsm.tension import bounds_at, distribute_tension
 
@@ -112,7 +118,7 @@ def payload(
         CdsmError: A linear program fails.
     """
     instance("pose", pose, Posture)
-    allowed = checked("deflection", deflection, "length", infinite=True)
+    allowed = checked_quantity("deflection", deflection, "length", infinite=True)
     W = wrench_vector("wrench", wrench)
     K = stiffness(
         pose, distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)

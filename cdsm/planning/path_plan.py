@@ -11,7 +11,7 @@ from cdsm.errors import CdsmError, listed
 from cdsm.manipulator import Manipulator
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.format import merged, plain, plural
+from cdsm.support.format import merged, plural, prepare_json
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.values import Array, Plotted, frozen
 
@@ -114,7 +114,7 @@ class PathPlan(Result, Plotted):
             for sample in self.infeasible
         ]
         names = {"joints": self.arm.joint_names, "cables": self.arm.cables.names}
-        return merged(plain(names), super().to_dict(), {"infeasible": causes})
+        return merged(prepare_json(names), super().to_dict(), {"infeasible": causes})
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with a row and the status of each sample; needs pandas (CdsmError)."""

@@ -20,8 +20,7 @@ from cdsm.geometry.beams import buckling_doubt
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import NO_WRENCH, bound, instance, wrench_vector
-from cdsm.support.validation import quantity as checked
+from cdsm.support.validation import NO_WRENCH, bound, checked_quantity, instance, wrench_vector
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import distribute_tension
 
@@ -179,7 +178,7 @@ def critical_tension(
     laws = [each.elasticity for each in arm.cables if each.control == "position"]
     low = max((law.low for law in laws), default=0.0) * _ABOVE
     ends = [*(law.high for law in laws), *(each.maximum for each in arm.cables)]
-    high = max(min([*ends, checked("up_to", up_to, "tension")]), low)
+    high = max(min([*ends, checked_quantity("up_to", up_to, "tension")]), low)
     first = max(low, _LOWEST)
     at(low)  # raises the reason if no tensions balance the arm
     bounds = np.unique([low, *np.geomspace(first, max(high, first), SAMPLES - 1)])

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field
 from io import StringIO
 from typing import TYPE_CHECKING, Literal, final
 
-from cdsm.support.format import merged, plain
+from cdsm.support.format import merged, prepare_json
 from cdsm.support.result import Result, unit
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ class Report(Result):
         """Return the report and :meth:`Stiffness.to_dict` in SI for JSON, units in the keys."""
         verdict = {"passed": self.passed, "faults": self.faults, "notes": self.notes}
         comparisons = {"comparisons": [asdict(comparison) for comparison in self.comparisons]}
-        parts = plain(verdict), plain(comparisons), super().to_dict()
+        parts = prepare_json(verdict), prepare_json(comparisons), super().to_dict()
         return merged(self.stiffness.to_dict(), *parts)
 
     def to_html(self, about: str = "") -> str:

@@ -11,12 +11,12 @@ from cdsm.posture import Posture
 from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import one_of
-from cdsm.support.values import Array, Named, Plotted, frozen
+from cdsm.support.values import Array, IndexedByName, Plotted, frozen
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Shares(Result, Named, Plotted):
+class Shares(Result, IndexedByName, Plotted):
     """Contributions to the stiffness in one direction; they add up to :attr:`total`.
 
     Attributes:

@@ -23,7 +23,7 @@ from cdsm.stiffness_matrix import prints
 from cdsm.stiffness_matrix.prints import Remedy, find_remedies, verdict
 from cdsm.stiffness_matrix.report import Report
 from cdsm.stiffness_matrix.shares import Shares
-from cdsm.support.format import coordinates, merged, plain
+from cdsm.support.format import coordinates, merged, prepare_json
 from cdsm.support.result import Result, tabulated, unit, unit_of
 from cdsm.support.validation import Direction, one_of, unit_direction, unit_directions
 from cdsm.support.values import Array, frozen
@@ -320,7 +320,7 @@ class Stiffness(Result):
 
     def to_dict(self) -> dict[str, object]:
         """Return the stiffness in SI for JSON, units in the keys; None for what does not exist."""
-        return merged(super().to_dict(), plain(prints.readings(self)))
+        return merged(super().to_dict(), prepare_json(prints.readings(self)))
 
     def __str__(self) -> str:
         return "\n".join([*self.warnings, *prints.table(self), *prints.notes(self)])

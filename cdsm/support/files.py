@@ -170,7 +170,7 @@ def _names_dtd(text: str, system: str) -> bool:
     return text.count("<!DOCTYPE") == 1 and re.search(alone, text) is not None
 
 
-def numbers(where: str, text: str | None, count: int) -> tuple[float, ...]:
+def read_numbers(where: str, text: str | None, count: int) -> tuple[float, ...]:
     """Return the ``count`` finite numbers in a text; else raise XmlFault, which names ``where``."""
     try:
         values = tuple(map(float, (text or "").split()))

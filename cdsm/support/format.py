@@ -62,7 +62,7 @@ def without_rounding(values: Array) -> Array:
     return np.where(size > _ROUNDING * size.max(initial=0.0), values, 0.0)
 
 
-def plain(numbers: Mapping[str, Any]) -> dict[str, object]:
+def prepare_json(numbers: Mapping[str, Any]) -> dict[str, object]:
     """Prepare values for JSON: arrays become lists, results dictionaries, inf and NaN None."""
     return {name: _plain(value) for name, value in numbers.items()}
 
@@ -78,7 +78,7 @@ def merged(*parts: Mapping[str, object]) -> dict[str, object]:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return plain(value)
+        return prepare_json(value)
     if hasattr(value, "to_dict"):
         return _plain(value.to_dict())
     if isinstance(value, Status):

@@ -16,7 +16,7 @@ from cdsm.errors import CdsmError, InvalidInput, need
 from cdsm.quantities import QUANTITIES, UNITS_OF_JOINTS
 from cdsm.status import Status
 from cdsm.support.files import as_path, write_file
-from cdsm.support.format import JointUnits, key, merged, plain, span
+from cdsm.support.format import JointUnits, key, merged, prepare_json, span
 from cdsm.support.values import Array, ReadOnlyState
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
-AXES = ("x", "y", "z")
+AXIS_NAMES = ("x", "y", "z")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -142,7 +142,7 @@ class Result(ReadOnlyState):
             named = bool(dims) and set(dims) <= {"joint", "cable"}
             entry = _by_name(value, dims, labels) if named else value
             numbers = merged(numbers, {key(name, unit_name): entry})
-        return plain(numbers)
+        return prepare_json(numbers)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return all numbers as a labelled Dataset in SI; needs xarray (CdsmError)."""
@@ -238,8 +238,8 @@ class Result(ReadOnlyState):
 
     def _labels(self) -> dict[str, Sequence[object]]:
         """Return the names along each dimension that has names."""
-        labels: dict[str, Sequence[object]] = {"axis": AXES, "component": COMPONENTS}
-        labels |= {"axis_column": AXES, "motion": MOTIONS, "motion_column": MOTIONS}
+        labels: dict[str, Sequence[object]] = {"axis": AXIS_NAMES, "component": COMPONENTS}
+        labels |= {"axis_column": AXIS_NAMES, "motion": MOTIONS, "motion_column": MOTIONS}
         if self._arm:
             joints = self._arm.joint_names
             cables = self._arm.cables

@@ -69,7 +69,7 @@ def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = 
     return f"{f'{value:g} {unit}'.rstrip()} given; {', or '.join(words)} is needed"
 
 
-def quantity(
+def checked_quantity(
     name: str, value: object, kind: str, *, zero: bool = False, infinite: bool = False
 ) -> float:
     """Return a number of the range ``kind``, or InvalidInput; options as :func:`within`."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _AnyArray = TypeVar("_AnyArray", bound=NDArray[Any])
-_Given = TypeVar("_Given", contravariant=True)
+_Accepted = TypeVar("_Accepted", contravariant=True)
 _Kept = TypeVar("_Kept", covariant=True)
 
 
@@ -27,12 +27,12 @@ def frozen(array: _AnyArray) -> _AnyArray:
     return array
 
 
-class Given(Protocol[_Given, _Kept]):
+class Converted(Protocol[_Accepted, _Kept]):
     """Type of a dataclass field that accepts another type than it keeps; only type checkers ask."""
 
     def __get__(self, owner: Any, kind: type) -> _Kept: ...
 
-    def __set__(self, owner: Any, value: _Given) -> None: ...
+    def __set__(self, owner: Any, value: _Accepted) -> None: ...
 
 
 class Printed:
@@ -63,7 +63,7 @@ class Plotted:
         return draw(self._figure, self)
 
 
-class Named:
+class IndexedByName:
     """Base class of results that are indexed by name: iteration and ``in`` go over the names."""
 
     def keys(self) -> tuple[Any, ...]:

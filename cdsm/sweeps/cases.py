@@ -23,7 +23,7 @@ from cdsm.measures.polytope import balanced, polytope_of
 from cdsm.posture import Posture
 from cdsm.quantities import names_of
 from cdsm.status import Status
-from cdsm.support.validation import flag, quantity
+from cdsm.support.validation import checked_quantity, flag
 from cdsm.support.values import Array
 from cdsm.tension import checked_bounds, grip
 
@@ -246,6 +246,6 @@ def require(
             f"{arm.name} has no friction in its holes; leave it out, or give them a coefficient: "
             "friction = in ARM.toml, --set friction=0.1, Manipulator.with_friction.",
         )
-    quantity("diameter", diameter, "diameter", zero=True)
+    checked_quantity("diameter", diameter, "diameter", zero=True)
     if "force_radius" in names and math.isinf(checked_bounds(arm, 0.0, maximum)[1].max()):
         raise InvalidInput("maximum", "force_radius needs a finite one [N].")

@@ -25,7 +25,7 @@ from cdsm.support.validation import (
     one_of,
     wrench_vector,
 )
-from cdsm.support.values import Array, Named, frozen
+from cdsm.support.values import Array, IndexedByName, frozen
 from cdsm.tension.infeasibility import infeasible
 from cdsm.tension.least_tensions import least_tensions
 from cdsm.tension.solvers import DEFAULT_SOLVER, OPTIMALITY, nondimensional
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Tension(Result, Named):
+class Tension(Result, IndexedByName):
     """Cable tensions that balance an arm, with the posture, load and bounds they were computed for.
 
     The keys are the names of the cables: ``tension["cable1_1"]`` [N], ``dict(tension)``. Use the
@@ -148,7 +148,7 @@ def distribute_tension(
         raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
     for name, value in fixed.items():
         c = cables.names.index(one_of("cable", name, cables.names))
-        held = validation.quantity(f"fixed[{name!r}]", value, "tension", zero=True)
+        held = validation.checked_quantity(f"fixed[{name!r}]", value, "tension", zero=True)
         low, high = (frozen(np.r_[each[:c], held, each[c + 1 :]]) for each in (low, high))
     wrench = wrench_vector("wrench", wrench)
     torque = pose.jacobian.T @ wrench - pose.own_torque

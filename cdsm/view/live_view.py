@@ -22,7 +22,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.planning.path import checked_path
 from cdsm.plots.style import MM
 from cdsm.status import Status
-from cdsm.support.validation import instance, quantity, vector, whole_number
+from cdsm.support.validation import checked_quantity, instance, vector, whole_number
 from cdsm.support.values import Array
 from cdsm.view.panel import Panel
 from cdsm.view.scene import HANDLE, Scene
@@ -90,8 +90,8 @@ def serve(
     route = path if path is None or tips is not None else _tips(arm, path)
     start = Setting(
         q=arm._angles(straight if q is None else q, check_limits=True),
-        minimum=quantity("minimum", minimum, "tension", zero=True),
-        maximum=quantity("maximum", maximum, "tension", infinite=True),
+        minimum=checked_quantity("minimum", minimum, "tension", zero=True),
+        maximum=checked_quantity("maximum", maximum, "tension", infinite=True),
         force=vector("force", force, 3, "force at the tip [N], base axes"),
         pull=np.zeros(len(arm.cables)) if pulled else None,
     )

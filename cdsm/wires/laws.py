@@ -14,7 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import InvalidInput, warn
 from cdsm.support.format import span
-from cdsm.support.validation import LARGEST, RANGES, SMALLEST, number_array, quantity, scalar
+from cdsm.support.validation import (
+    LARGEST,
+    RANGES,
+    SMALLEST,
+    checked_quantity,
+    number_array,
+    scalar,
+)
 from cdsm.support.values import Array
 from cdsm.wires.elasticity import Elasticity
 
@@ -43,7 +50,7 @@ class LinearElasticity(Elasticity):
     """
 
     def __init__(self, rigidity: float) -> None:
-        EA = quantity("rigidity", rigidity, "rigidity")
+        EA = checked_quantity("rigidity", rigidity, "rigidity")
         if not 1e3 <= EA <= 1e9:
             doubt = "kN" if EA < 1e3 else "E instead of EA"
             warn(f"a wire with EA = {EA:g} N is unusual: {doubt}? EA is needed in N.")

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import number_array, scalar
-from cdsm.support.validation import quantity as checked
+from cdsm.support.validation import checked_quantity, number_array, scalar
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import TabulatedElasticity
@@ -173,7 +172,7 @@ def fit_tensile_test(
     """
     u = number_array("displacement", displacement)
     F = number_array("force", force)
-    length = checked("gauge_length", gauge_length, "length")
+    length = checked_quantity("gauge_length", gauge_length, "length")
     if u.ndim != 1 or u.shape != F.shape:
         raise InvalidInput("force", f"shapes {u.shape} and {F.shape} given; a point needs both.")
     limits = np.asarray(between)

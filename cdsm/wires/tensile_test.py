@@ -12,7 +12,7 @@ import numpy as np
 
 from cdsm.errors import FileError, InvalidInput
 from cdsm.support.tables import read_table
-from cdsm.support.validation import quantity, sequence_of
+from cdsm.support.validation import checked_quantity, sequence_of
 from cdsm.support.values import Array, frozen
 
 _LENGTHS: Final = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "um": 1e-6, "in": 0.0254}
@@ -89,7 +89,7 @@ def read_tensile_csv(
         if pair is not None and len(sequence_of(name, pair, str)) != 2:
             raise InvalidInput(name, f"{pair!r} given; give two, of displacement and force.")
     if gauge_length is not None:
-        quantity("gauge_length", gauge_length, "length")
+        checked_quantity("gauge_length", gauge_length, "length")
     if decimal not in (None, ".", ","):
         raise InvalidInput("decimal", f"{decimal!r} given; it is '.' or ','.")
     table = read_table(path, ";\t,", any_encoding=True)

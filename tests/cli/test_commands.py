@@ -15,7 +15,7 @@ from typer.testing import CliRunner, Result
 
 import cdsm
 from cdsm.cli import app
-from cdsm.support.format import plain
+from cdsm.support.format import prepare_json
 from tests.interchange.test_caspr import cable, folder, link
 from tests.support.arms import readme_geometry
 
@@ -66,7 +66,7 @@ def told(*arguments: object, code: int = 0) -> dict[str, Any]:
 def assert_holds(answer: dict[str, Any], *results: Any) -> None:
     """Assert that an answer has all numbers of these results."""
     for result in results:
-        assert plain(result.to_dict()).items() <= answer.items()
+        assert prepare_json(result.to_dict()).items() <= answer.items()
 
 
 @pytest.fixture
@@ -105,7 +105,7 @@ def test_stiffness_with_tolerances_and_friction(probe: Path, pose: cdsm.Posture)
     rough, given = pose.arm.with_friction(0.1).at(pose.q), cdsm.Tolerances(joint_angle=0.01)
     tension = cdsm.distribute_tension(rough, 30.0)
     sure = cdsm.uncertainty(rough, tension, given, direction="z")
-    assert found["uncertainty"]["z"] == plain(sure.to_dict())
+    assert found["uncertainty"]["z"] == prepare_json(sure.to_dict())
     assert found["sticking"]["z"]["breakaway_N"] == cdsm.breakaway(rough, tension, "z").load
 
 
@@ -122,7 +122,7 @@ def test_the_posture_follows_from_what_the_motors_do(tmp_path: Path) -> None:
     pulled = cdsm.forward_statics(arm, pull=[0.003, -0.004, 0.0])
     hung = ("weigh", file, "--pull", "3,-4,0", "--load", "0,0,-0.01")
     found = told(*hung)
-    assert found["rest"] == plain(pulled.to_dict())
+    assert found["rest"] == prepare_json(pulled.to_dict())
     assert_holds(found, cdsm.weight_test(pulled.pose, pulled, weight, steps=5))
     assert "motors hold lengths" in call(*hung).stdout
     for more in (("--tension", "2,0,1"), ("--angles", 0), ("--minimum", 2)):
@@ -175,8 +175,8 @@ def test_buckle(probe: Path, pose: cdsm.Posture) -> None:
     cables = cdsm.serpentine_cables(geometry, law, series_stiffness=2500.0)
     arm = cdsm.Manipulator(geometry, cables=cables).at(pose.q)
     load = cdsm.critical_load(arm, [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 3.0)
-    assert found["critical_tension"] == plain(cdsm.critical_tension(arm).to_dict())
-    assert found["critical_load"] == plain(load.to_dict())
+    assert found["critical_tension"] == prepare_json(cdsm.critical_tension(arm).to_dict())
+    assert found["critical_load"] == prepare_json(load.to_dict())
 
 
 def test_plan_at_a_posture(probe: Path, pose: cdsm.Posture, tmp_path: Path) -> None:

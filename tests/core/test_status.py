@@ -10,7 +10,7 @@ import cdsm
 from cdsm import Status
 from cdsm.design import InfeasibleDesign
 from cdsm.status import ENTRY_STATUSES
-from cdsm.support.format import plain
+from cdsm.support.format import prepare_json
 
 ZERO = np.zeros(3)
 
@@ -55,5 +55,5 @@ def test_every_error_carries_its_cause(
     assert error.status is status
     assert (status.is_unmet, status.is_fault) == (is_unmet, is_fault)
     assert pickle.loads(pickle.dumps(error)).status is status
-    data = json.loads(json.dumps(plain({"status": error.status})))
+    data = json.loads(json.dumps(prepare_json({"status": error.status})))
     assert data == {"status": status.word}
