@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cdsm.cable import Cable
 from cdsm.errors import ElasticityRangeError
 from cdsm.support.values import Array, frozen
-from cdsm.wires.elasticity import Elasticity
+from cdsm.wires.elasticity import Elasticity, newton_in_bracket
 
 
 def group_by_law(cables: Iterable[tuple[int, Cable]]) -> dict[Elasticity, list[int]]:
@@ -108,6 +108,20 @@ class CableLaws:
             wire[of] /= self._evaluate(law, of, tension[of])[0]
         return frozen(wire)
 
+    def stretched(self, tension: Array, free_length: Array, longer: Array) -> tuple[Array, Array]:
+        """Compute tensions (C,) [N] and energies (C,) [J] of cables that became longer.
+
+        Position-controlled cables with the original lengths l_0 (C,) [m] and the tensions F_0 (C,)
+        [N], the ``tension``, become ``longer`` (C,) [m]; the others keep their tensions. The energy
+        is ∫ F dL from F_0 on. Raises ElasticityRangeError if a tension F_0 is outside its law.
+        """
+        F = np.array(tension)
+        energy = tension * longer
+        for law, of in self.held:
+            start = law.require_inside(tension[of])
+            F[of], energy[of] = _stretch(law, start, free_length[of], self.series[of], longer[of])
+        return F, energy
+
     def stiffness_slope(self, tension: Array, stiffness: Array) -> Array:
         """Compute dk/dF (C,) [1/m] at a constant posture, at which l_0 changes with F.
 
@@ -141,3 +155,26 @@ class CableLaws:
         outside = np.arange(len(self._cables))[of][list(error.indices)].tolist()
         names = [self._cables[c].name for c in outside]
         return ElasticityRangeError(error.problem, error.tension, outside, names)
+
+
+def _stretch(
+    law: Elasticity, start: Array, free_length: Array, series: Array, longer: Array
+) -> tuple[Array, Array]:
+    """Compute F (n,) [N] and ∫ F dL (n,) [J] of n cables of one law, ``longer`` than at ``start``.
+
+    Beyond the law, they have the tensions of its ends.
+    """
+
+    def elongation(F: Array) -> tuple[Array, Array]:
+        strain, EA = law.evaluate(F)
+        return free_length * strain + series * F, free_length / EA + series
+
+    wanted = elongation(start)[0] + longer
+
+    def excess(F: Array) -> tuple[Array, Array]:
+        reached, slope = elongation(F)
+        return reached - wanted, slope
+
+    F, _ = newton_in_bracket(excess, start, *np.full((2, start.size), [[law.low], [law.high]]))
+    wire = free_length * (law.energy(F) - law.energy(start))
+    return F, wire + series * (F**2 - start**2) / 2.0

@@ -122,6 +122,11 @@ class Springs:
         pulled = self.stiffness * (self._coupling.angles(q) - self.angle)
         return np.asarray(pulled @ self._coupling.matrix)
 
+    def energy(self, q: Array) -> float:
+        """Compute ½ Σ k (θ − q_0)² [J]."""
+        angles = q if self._coupling is None else self._coupling.angles(q)
+        return float(0.5 * self.stiffness @ (angles - self.angle) ** 2)
+
     @cached_property
     def matrix(self) -> Array:
         """Second derivative of the energy (nv, nv) [N m/rad]: diag k, or Sᵀ diag k S."""

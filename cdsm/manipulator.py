@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.cable import Cable, Cables, serpentine_cables
 from cdsm.cable_laws import CableLaws
+from cdsm.definition import Term, checked_terms
 from cdsm.errors import InvalidInput, listed, warn
 from cdsm.geometry import Geometry
 from cdsm.joints import Spring, Springs, springs_of
@@ -41,6 +42,7 @@ from cdsm.support.validation import (
     vector,
 )
 from cdsm.support.values import Array, Printed, frozen
+from cdsm.terms import Gravity, JointSprings
 from cdsm.tolerances import Tolerances
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
@@ -97,8 +99,10 @@ class Manipulator(Printed):
         tip_link: Name of the link whose frame is the tip.
         gravity: Gravity in base axes (3,) [m/s²].
         tolerances: Uncertainties of dimensions and measured values; zero if none were given.
-        springs: Springs at the joints: ``springs.stiffness`` k (nv,) [N m/rad] and
-            ``springs.angle`` q_0 (nv,) [rad], at which they have no torque.
+        springs: Springs at the joints: ``springs.stiffness`` k (n,) [N m/rad] and
+            ``springs.angle`` q_0 (n,) [rad], at which they have no torque; of all n joints, also
+            those that follow others.
+        extra_terms: Further terms of the energy, of :meth:`with_terms`.
         nv: Number of degrees of freedom.
         joint_names: Names of the joints, in the order of every (nv,) array.
         slides: Whether each joint is prismatic (nv,); its coordinate is then a length [m].
@@ -128,6 +132,7 @@ class Manipulator(Printed):
     routing: Routing
     laws: CableLaws
     own_springs: dict[str, tuple[float, float]] | None
+    extra_terms: tuple[Term, ...]
     _doubts: tuple[str, ...]
 
     def __init__(
@@ -233,7 +238,7 @@ class Manipulator(Printed):
         The text of a URDF is written into the same file.
 
         Raises:
-            InvalidInput: An elasticity of this kind cannot be written to a file.
+            InvalidInput: A wire of this kind, or a term of :meth:`with_terms`, cannot be written.
             FileError: The file cannot be written; an existing file stays unchanged.
         """
         from cdsm.arm_file.arm import arm_text
@@ -276,10 +281,10 @@ class Manipulator(Printed):
             length_jacobian=frozen(routing.jacobian(spans)),
             gravity_torque=frozen(state.gravity_torque),
             gravity_stiffness=frozen(state.gravity_stiffness),
-            _twist=frozen(state.twist),
-            _placements=frozen(state.placement),
-            _sites=frozen(site),
-            _spans=spans,
+            twist=frozen(state.twist),
+            placements=frozen(state.placement),
+            sites=frozen(site),
+            spans=spans,
         )
 
     def _angles(self, q: ArrayLike, check_limits: bool) -> Array:
@@ -338,6 +343,11 @@ class Manipulator(Printed):
         return max(self.body.length, reach)
 
     @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """Terms of the energy without cables and loads: gravity, springs, further ones."""
+        return Gravity(), JointSprings(self.springs), *self.extra_terms
+
+    @cached_property
     def has_springs(self) -> bool:
         """Whether a spring turns any joint."""
         return bool(self.springs.stiffness.any())
@@ -379,6 +389,7 @@ class Manipulator(Printed):
         geometry: Geometry | None = None,
         tolerances: Tolerances = Tolerances(),  # noqa: B008  # frozen
         springs: Mapping[str, Spring] | None = None,
+        terms: Sequence[Term] = (),
         like: Manipulator | None = None,
     ) -> Self:
         """Set all attributes; ``urdf`` is checked, the user has seen the doubts about ``like``."""
@@ -396,6 +407,7 @@ class Manipulator(Printed):
         self.__dict__.update(urdf=urdf, cables=cables, tip_link=tip_link, gravity=gravity)
         self.__dict__.update(tolerances=tolerances, springs=own)
         self.__dict__.update(_geometry=geometry, body=body, own_springs=changed)
+        self.__dict__.update(extra_terms=checked_terms(terms))
         self.__dict__.update(routing=Routing.of(body, cables))
         self.__dict__.update(laws=CableLaws(cables), _doubts=_doubts(self))
         for doubt in self._doubts:
@@ -408,6 +420,7 @@ class Manipulator(Printed):
         names = ("urdf", "cables", "tip_link", "joint_names", "tolerances")
         state = {name: getattr(self, name) for name in names}
         state |= {"geometry": self._geometry, "springs": self.own_springs}
+        state |= {"terms": self.extra_terms}
         return state | {"gravity": tuple(self.gravity.tolist())}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -452,6 +465,20 @@ class Manipulator(Printed):
             InvalidInput: A stiffness is negative, or no number. There is no such joint.
         """
         return self.replace(springs=springs)
+
+    def with_terms(self, terms: Sequence[Term]) -> Manipulator:
+        """Return the same arm with these further terms of its energy, and no others.
+
+        Args:
+            terms: Objects with a ``name``, and methods ``energy(pose)`` U [J], ``torque(pose)``
+                ∂U/∂θ (nv,) and ``stiffness(pose)`` ∂²U/∂θ² (nv, nv), as in ``cdsm/terms.py``. They
+                count in balance and K_θ. What cannot take them refuses them by name: batches,
+                and what computes by them, such as sweeps and designs; MuJoCo models; ARM.toml.
+
+        Raises:
+            InvalidInput: An object is no term, or a name is in use.
+        """
+        return self.replace(terms=terms)
 
     def with_gravity(self, gravity: Direction) -> Manipulator:
         """Return the same arm under another gravity: (3,) [m/s²] in base axes, or an axis."""

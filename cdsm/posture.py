@@ -8,11 +8,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry.parts import overlapping
-from cdsm.routing import Spans, cross
+from cdsm.routing import Spans
 from cdsm.segments import Segments
 from cdsm.support.format import aligned, coordinates, merged, prepare_json
 from cdsm.support.result import Result, unit
@@ -42,6 +41,10 @@ class Posture(ReadOnlyState):
         length_jacobian: J_L = ∂L/∂θ (C, nv) [m/rad].
         gravity_torque: g = ∂V/∂θ (nv,) [N m] with the potential energy V: J_Hᵀ G_g of Eq. 13.
         gravity_stiffness: ∂g/∂θ (nv, nv) [N m/rad]: H_H G_g of Eq. 16.
+        twist: (v, z) (6, n) of all n joints: a point x that joint j moves has ∂x/∂θ_j = v + z × x.
+        placements: Poses (n+1, 4, 4) of the base and of the joints' frames.
+        sites: Positions (3, P) [m] of the sites of all cables.
+        spans: Segments of all cables, with their motions.
     """
 
     arm: Manipulator
@@ -52,25 +55,10 @@ class Posture(ReadOnlyState):
     length_jacobian: Array
     gravity_torque: Array
     gravity_stiffness: Array
-    _twist: Array
-    _placements: Array
-    _sites: Array
-    _spans: Spans
-
-    @property
-    def spring_torque(self) -> Array:
-        """Torque k (q − q_0) (nv,) [N m] of the joint springs, as a derivative of their energy."""
-        return frozen(self.arm.springs.torque(self.q))
-
-    @property
-    def own_torque(self) -> Array:
-        """Derivative of the energy of weight and springs (nv,)."""
-        return self.gravity_torque + self.spring_torque
-
-    @property
-    def own_stiffness(self) -> Array:
-        """Second derivative of the energy of weight and springs (nv, nv)."""
-        return self.gravity_stiffness + self.arm.springs.matrix
+    twist: Array
+    placements: Array
+    sites: Array
+    spans: Spans
 
     def __repr__(self) -> str:
         return f"<Posture of {self.arm.name}, tip at {coordinates(1e3 * self.tip[:3, 3])} mm>"
@@ -103,19 +91,19 @@ class Posture(ReadOnlyState):
         routing = self.arm.routing
         one = np.ones(routing.cable.size)
         count = len(self.cable_lengths)
-        return frozen(routing.hessians(self._spans, one, routing.cable, count))
+        return frozen(routing.hessians(self.spans, one, routing.cable, count))
 
     @cached_property
     def cable_paths(self) -> tuple[Array, ...]:
         """Sites of each cable in base axes, one array (sites, 3) per cable [m]."""
         ends = np.cumsum([len(cable.sites) for cable in self.arm.cables])
-        return tuple(frozen(path.copy()) for path in np.split(self._sites.T, ends[:-1]))
+        return tuple(frozen(path.copy()) for path in np.split(self.sites.T, ends[:-1]))
 
     @property
     def joint_positions(self) -> Array:
         """Positions of the joints (nv, 3) [m]: one point on each joint axis."""
         coupling = self.arm.body.coupling
-        every = self._placements[1:, :3, 3]
+        every = self.placements[1:, :3, 3]
         return frozen(every[list(coupling.leaders)]) if coupling else every
 
     @property
@@ -131,7 +119,7 @@ class Posture(ReadOnlyState):
     @cached_property
     def _bones(self) -> list[tuple[int, Array]]:
         """The bones, each with the row of the joint that carries its link; row 0 is the base."""
-        origin = self._placements[:, :3, 3]
+        origin = self.placements[:, :3, 3]
         body = self.arm.body
         tip = ([0, *body.tip_joints + 1][-1], self.tip[:3, 3])
         ends = [*zip(body.parent[1:], origin[1:], strict=True), tip]
@@ -141,10 +129,10 @@ class Posture(ReadOnlyState):
     def _stick_figure(self, without: Collection[int] = ()) -> tuple[list[Array], list[Array]]:
         """Return :attr:`bones` and :attr:`brackets`, except those of the rows in ``without``."""
         brackets = []
-        for row, site in zip(self.arm.routing.row.tolist(), self._sites.T, strict=True):
+        for row, site in zip(self.arm.routing.row.tolist(), self.sites.T, strict=True):
             if row not in without:
                 feet = [foot(site, bone) for at, bone in self._bones if at == row]
-                ends = feet or [self._placements[row, :3, 3]]
+                ends = feet or [self.placements[row, :3, 3]]
                 nearest = min(ends, key=lambda end: float(np.linalg.norm(end - site)))
                 brackets.append(frozen(np.array([site, nearest])))
         return [bone for row, bone in self._bones if row not in without], brackets
@@ -176,42 +164,11 @@ class Posture(ReadOnlyState):
     @cached_property
     def segments(self) -> Segments:
         """Lengths of cable segments between holes, and wrap angles; computed on first use."""
-        return Segments.at(self.arm.chains, self._twist, self._placements)
+        return Segments.at(self.arm.chains, self.twist, self.placements)
 
     def equals(self, other: Posture) -> bool:
         """Return whether arm and joint angles are equal."""
         return self is other or (self.arm == other.arm and np.array_equal(self.q, other.q))
-
-    def _active(self, tension: Array) -> Array:
-        """Compute the active term H_L·F (nv, nv) [N m/rad] of K_θ for tensions F (C,) [N]."""
-        routing = self.arm.routing
-        return np.asarray(routing.hessian(self._spans, tension[routing.cable]))
-
-    def _load(self, wrench: Array) -> Array:
-        """Compute the load term −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad] of K_θ for a wrench W (6,)."""
-        body = self.arm.body
-        if body.coupling is None:
-            return load_stiffness(self.jacobian, wrench, body.tip_joints)
-        v = self._twist[:3]
-        z = self._twist[3:]
-        every = np.vstack([v + cross(z, self.tip[:3, 3:]), z])
-        return body.coupling.square(load_stiffness(every, wrench, body.tip_joints))
-
-
-def load_stiffness(jacobian: Array, wrench: Array, tip_joints: NDArray[np.intp]) -> Array:
-    """Compute −∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench W (6,) at the tip, from J_X (6, nv).
-
-    Let joint a be before b on the way to the tip. A force f gives −(f × z_a)·v_b in the entries
-    (a, b) and (b, a); a moment m gives −(m × z_a)·z_b in the entry (b, a) alone.
-    """
-    load = np.zeros((jacobian.shape[1],) * 2)
-    if wrench.any():
-        v, z = np.split(jacobian[:, tip_joints], 2)
-        later = np.tri(len(tip_joints), k=-1)
-        force = (1.0 - later) * (cross(z, wrench[:3, None]).T @ v)
-        moment = later * (cross(z, wrench[3:, None]).T @ z)
-        load[np.ix_(tip_joints, tip_joints)] = force + force.T * later - moment
-    return load
 
 
 @final

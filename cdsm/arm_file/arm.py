@@ -15,6 +15,7 @@ from typing import Any
 
 from cdsm.arm_file.model import SETTINGS, read_model
 from cdsm.cable import Cable, Site, serpentine_cables
+from cdsm.definition import refuse_terms
 from cdsm.errors import FileError, GeometryError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import write_text
@@ -142,7 +143,8 @@ def read_arm(
 
 
 def arm_text(arm: Manipulator) -> str:
-    """Return the text of an ARM.toml; InvalidInput if an elasticity cannot be written."""
+    """Return the text of an ARM.toml; InvalidInput if a wire or a term cannot be written."""
+    refuse_terms(arm.extra_terms, "ARM.toml has no key for the terms", "terms")
     cables = arm.cables
     geometry = arm.geometry if arm.is_serpentine else None
     values, tables = _wire_tables(cables)

@@ -10,6 +10,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.errors import InvalidInput, listed
 from cdsm.manipulator import Manipulator
 from cdsm.support.values import Array, frozen
 from cdsm.tension.solvers import NO_ARM
@@ -72,6 +73,14 @@ class Pose(NamedTuple):
     shortest: Array  # length of the shortest segment (B, W) [m]
 
 
+_KERNELS = frozenset(("gravity", "springs"))  # terms of an arm that the kernels compute
+
+
+def without_kernel(arm: Manipulator) -> list[str]:
+    """Return the names of the terms of an arm that no kernel computes."""
+    return [term.name for term in arm.terms if term.name not in _KERNELS]
+
+
 class ArmRows:
     """Arrays of an arm; its joints are in Pinocchio's order, each after its parent.
 
@@ -83,6 +92,9 @@ class ArmRows:
     """
 
     def __init__(self, arm: Manipulator) -> None:
+        if lacking := without_kernel(arm):
+            remedy = "use stiffness() posture by posture."
+            raise InvalidInput("arm", f"batches have no kernel for {listed(lacking)}; {remedy}")
         tree = arm.body.arrays()
         routing = arm.routing
         parent = tree.parent[1:]

@@ -29,6 +29,7 @@ from cdsm.posture import Posture
 from cdsm.support.validation import checked_quantity, scalar, whole_number
 from cdsm.support.values import Array
 from cdsm.tension import grip
+from cdsm.terms import torque_of
 
 _LARGEST_NOISE: Final = 4.0  # standard deviations at which noise is cut off
 _UNSURE: Final = 0.3  # standard deviation of 1/s before the first measurement
@@ -194,7 +195,7 @@ class Observer:
         F = tension[segments.chains.start[:-1]]
         spread = np.hypot(max(self._tension_spread, _LEAST_SPREAD), grip(pose) * F)
         weights = np.linalg.pinv(pose.length_jacobian.T * spread)
-        torque = tension @ segments.length_jacobian + pose.own_torque
+        torque = tension @ segments.length_jacobian + torque_of(pose.arm.terms, pose)
         found = np.linalg.lstsq(weights @ pose.jacobian[:3].T, weights @ torque, rcond=None)
         return np.asarray(found[0])
 

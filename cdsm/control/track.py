@@ -39,6 +39,7 @@ from cdsm.support.progress import show_progress
 from cdsm.support.validation import checked_quantity, instance, one_of, whole_number
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
+from cdsm.terms import required_torque
 
 _MOST_STEPS: Final = 1000  # largest number of steps of control between two samples
 
@@ -237,7 +238,7 @@ def _schedule(plan: PathPlan, steps: int, hung: Array) -> list[_Wanted]:
     parts = plan.angles, plan.tensions, plan.target, loads
     for q, F, target, W in zip(*map(along, parts), strict=True):
         pose = arm.at(q)
-        missing = pose.jacobian.T @ W - pose.own_torque - F @ pose.length_jacobian
+        missing = required_torque(pose, W) - F @ pose.length_jacobian
         F = np.clip(F + np.linalg.lstsq(pose.length_jacobian.T, missing)[0], *domains)
         reference = reference_at(arm, q, F)
         late = 2 * len(wanted) >= len(at) - 1

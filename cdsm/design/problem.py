@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.arm_parameters import ArmParameters
 from cdsm.cable import require_own_cables
+from cdsm.definition import refuse_terms
 from cdsm.design.goals import Constraint, Measure, Objective
 from cdsm.design.variables import WHOLE, Value, Variable, changed
 from cdsm.errors import InvalidInput
@@ -74,6 +75,7 @@ class DesignProblem(ReadOnlyState):
 
     def __post_init__(self) -> None:
         geometry = instance("arm", self.arm, Manipulator).geometry  # raises without one
+        refuse_terms(self.arm.extra_terms, "batches, and so designs, have no kernel for")
         require_own_cables(geometry, self.arm.cables)
         variables = sequence_of("variables", self.variables, Variable)
         objectives = sequence_of("objectives", self.objectives, Objective)

@@ -16,6 +16,7 @@ from cdsm.segments import STRAIGHT
 from cdsm.stiffness_matrix import Friction, Stiffness, assemble
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
+from cdsm.terms import total
 from cdsm.wires.elasticity import Elasticity
 
 Flags = NDArray[np.bool_]
@@ -229,13 +230,11 @@ def assemble_segments(
     F = frozen(tension[chains.start[:-1]])
     k = pose.arm.laws.stiffness(pose.cable_lengths, F)
     frictionless = assemble(pose, F, wrench, k, distribution)
+    terms = {**frictionless.terms, "active": active, "passive": frozen(passive)}
     return replace(
         frictionless,
-        active=active,
-        passive=frozen(passive),
-        joint=frozen(
-            active + passive + frictionless.gravity + frictionless.load + frictionless.springs
-        ),
+        terms=terms,
+        joint=frozen(total(terms.values())),
         friction=friction,
         segment_tension=frozen(tension),
         tension_gradient=frozen(gradient),

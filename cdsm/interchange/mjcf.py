@@ -22,6 +22,7 @@ import numpy as np
 from lxml import etree
 from numpy.typing import ArrayLike
 
+from cdsm.definition import refuse_terms
 from cdsm.errors import InvalidInput, warn
 from cdsm.interchange.mjcf_bodies import LEAST_INERTIA, add_bodies, couple, row
 from cdsm.manipulator import Manipulator
@@ -148,7 +149,9 @@ def mujoco_model(
     damping: float | None = None,
 ) -> MuJoCoModel:
     """Build the MJCF text of :func:`to_mjcf`, with its settings; the arguments are the same."""
-    instance("arm", arm, Manipulator)
+    refuse_terms(
+        instance("arm", arm, Manipulator).extra_terms, "a MuJoCo model has no element for its terms"
+    )
     if (pose is None) != (tension is None):
         raise InvalidInput("tension", "give pose and tension, or neither.")
     if pose is not None and instance("pose", pose, Posture).arm != arm:

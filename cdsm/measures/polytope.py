@@ -24,6 +24,7 @@ from cdsm.support.validation import NO_WRENCH, instance, wrench_vector
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import bounds_at, distribute_tension
 from cdsm.tension.solvers import Solution, maximise
+from cdsm.terms import required_torque
 
 _NO_MOTION = 1e-9
 """Smaller singular values of J_v, divided by the arm length, count as zero: no tip motion there."""
@@ -225,7 +226,7 @@ def balanced(pose: Posture, U: Array, wrench: Array, low: Array, high: Array) ->
     lever = abs(A).max(axis=1)
     lever[lever == 0.0] = 1.0
     A /= lever[:, None]
-    b = (pose.jacobian.T @ wrench - pose.own_torque) / lever
+    b = required_torque(pose, wrench) / lever
     count = low.size
     free = np.full(U.shape[1], math.inf)
     # near the straight arm, forces along it are huge: each counts by what it does to the joints

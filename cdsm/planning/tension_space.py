@@ -28,6 +28,7 @@ from cdsm.support.validation import SMALLEST, instance
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, advice, distribute_tension, too_few_cables
 from cdsm.tension.solvers import DEFAULT_SOLVER, Problem, nondimensional, solve, without_warnings
+from cdsm.terms import CABLE_TERMS, required_torque, total
 
 MARGIN: Final = 1e-2
 """An arm counts as stable down to this part of the smallest eigenvalue of K_θ at the anchor."""
@@ -84,8 +85,9 @@ class TensionSpace:
         for u in self.directions:
             K.require_mobile(u)
         self._size = max(float(K._magnitudes.diagonal().min()), SMALLEST)
-        self.constant_stiffness = K.gravity + K.load + K.springs
-        torque = pose.jacobian.T @ self.least.wrench - pose.own_torque
+        constant = [matrix for name, matrix in K.terms.items() if name not in CABLE_TERMS]
+        self.constant_stiffness = total(constant)
+        torque = required_torque(pose, self.least.wrench)
         self._balance = nondimensional(J, torque, low, high, pose.arm.length)
         _, sizes, basis = np.linalg.svd(J.T)
         rank = int((sizes > _FLAT * sizes.max(initial=0.0)).sum())

@@ -1,8 +1,8 @@
 """Check the terms of K_θ, balance (Eq. 13), and optimality of the tensions (Eq. 17).
 
-The torques J_Lᵀ F, g and −J_Xᵀ W are compared with ∂U/∂θ of the potentials of cables, weight and
-load, and the terms of K_θ with the derivatives of these torques: together, K_θ = ∂²U/∂θ². A moment
-at the tip has no potential; its work by a small rotation takes its place.
+The torque of each term is compared with ∂U/∂θ of its energy, and the term of K_θ with the
+derivative of this torque: together, K_θ = ∂²U/∂θ². A moment at the tip has no potential; its work
+by a small rotation takes its place.
 """
 
 from __future__ import annotations
@@ -13,16 +13,15 @@ import numpy as np
 from scipy.differentiate import jacobian
 from scipy.linalg import null_space
 from scipy.optimize import nnls
-from scipy.spatial.transform import Rotation
 
 from cdsm.batch.evaluation import evaluate
+from cdsm.batch.rows import without_kernel
+from cdsm.definition import Term
 from cdsm.errors import CdsmError, listed
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.stiffness_matrix.report import Comparison, Verdict
 from cdsm.support.values import Array
-
-TERMS = ("active", "passive", "gravity", "load", "springs", "joint")
-TORQUES = ("cable torque", "gravity torque", "load torque")
+from cdsm.terms import ConstantPull, Stretch, torque_size, without_cables
 
 TOLERANCE = 1e-6
 """Largest residual of balance, KKT residual and error of a term, relative to what they are of."""
@@ -39,7 +38,8 @@ def balance_error(K: Stiffness) -> tuple[float, str, float]:
     left = abs(K.residual * joint_unit(K))
     worst = int(left.argmax())
     most = float(left.max())
-    return most, K.posture.arm.joint_names[worst], most / (float(_torque_sizes(K).sum()) or 1.0)
+    _, *others = _torque_sizes(K)  # the torque of the cables is in the list twice
+    return most, K.posture.arm.joint_names[worst], most / (sum(others) or 1.0)
 
 
 def optimality(K: Stiffness) -> tuple[float | None, float | None]:
@@ -63,92 +63,100 @@ def optimality(K: Stiffness) -> tuple[float | None, float | None]:
 
 
 def compared(K: Stiffness) -> tuple[Comparison, ...]:
-    """Compare the terms of K_θ, K_θ, the torques of Eq. 13, and the batch, in this order."""
+    """Compare the terms of K_θ, K_θ, the torques of all terms, and the batch, in this order."""
     pose = K.posture
-    arm = K.posture.arm
-    W = K.wrench
-    nv = K.posture.arm.nv
+    arm = pose.arm
     unit = joint_unit(K)
-    states = zip(arm.cables, K.tension, K.cable_stiffness, strict=True)
-    moved = [c for c, (b, F, k) in enumerate(states) if b.control == "position" and F + k > 0.0]
-    edge = listed([each for c in moved for each in _edges(K, c)], 3)
+    terms = _terms(K)
+    edge = listed([reason for c in _moved(K) for reason in _edges(K, c)], 3)
+    followed = [term for term in terms if not edge or term.name != "passive"]
 
     def derived(places: Array) -> Array:
-        """Compute three potentials and five torques (3 + 5 nv, …) at ``places`` (nv, …)."""
-        poses = [arm.at(pose.q + x * unit, check_limits=False) for x in places.reshape(nv, -1).T]
-        longer = np.array([each.cable_lengths for each in poses]) - pose.cable_lengths
-        F = np.tile(K.tension, (len(poses), 1))
-        stored = K.tension * longer
-        for c in () if edge else moved:
-            cable = arm.cables[c]
-            free = float(K.free_lengths[c])
-            start = K.tension[c]
-            F[:, c] = cable.tension(cable.elongation(start, free) + longer[:, c], free)
-            stored[:, c] = cable.energy(F[:, c], free) - cable.energy(start, free)
-        rows = []
-        for there, tension, energy in zip(poses, F, stored, strict=True):
-            turn = Rotation.from_matrix(there.tip[:3, :3] @ pose.tip[:3, :3].T).as_rotvec()
-            work = W[:3] @ (there.tip[:3, 3] - pose.tip[:3, 3]) + W[3:] @ turn
-            weight = arm.body.potential_energy(there.q)
-            J = there.length_jacobian
-            g = there.gravity_torque
-            J_X = there.jacobian
-            torques = [K.tension @ J, (tension - K.tension) @ J, g, -W @ J_X, there.spring_torque]
-            rows.append(
-                np.concatenate([[energy.sum(), weight, -work], (np.array(torques) * unit).ravel()])
-            )
-        return np.asarray(np.array(rows).T / scale[:, None]).reshape(-1, *places.shape[1:])
+        """Compute n energies and n torques (n + n nv, …) at ``places`` (nv, …)."""
+        places_of = places.reshape(arm.nv, -1).T
+        poses = [arm.at(pose.q + x * unit, check_limits=False) for x in places_of]
+        columns = []
+        for moved in poses:
+            energies = [term.energy(moved) for term in followed]
+            columns.append(np.append(energies, [term.torque(moved) * unit for term in followed]))
+        values = np.transpose(columns) / scale[:, None]
+        return np.asarray(values.reshape(-1, *places.shape[1:]))
 
-    torques = np.array([K.tension @ pose.length_jacobian, pose.gravity_torque, -W @ pose.jacobian])
-    terms = np.array([getattr(K, name) for name in TERMS]) * unit[:, None] * unit
-    sizes = _torque_sizes(K)
-    largest = abs(terms).max(axis=(1, 2))
-    sizes = sizes + _SMALL * sizes.sum()
-    largest = largest + _SMALL * largest[-1]
-    scale = np.concatenate([sizes, np.repeat(largest[:-1], nv)])
+    names = [term.name for term in terms]
+    torques = np.array([term.torque(pose) for term in terms]) * unit
+    matrices = np.array([*K.terms.values(), K.joint]) * unit[:, None] * unit
+    torque_sizes = _torque_sizes(K)
+    torque_sizes = torque_sizes + _SMALL * torque_sizes[np.array(names) != "passive"].sum()
+    sizes = abs(matrices).max(axis=(1, 2))
+    sizes = sizes + _SMALL * sizes[-1]
+    known = [names.index(term.name) for term in followed]
+    scale = np.concatenate([torque_sizes[known], np.repeat(sizes[known], arm.nv)])
     scale[scale == 0.0] = 1.0
-    tolerances = {"atol": TOLERANCE / 10.0, "rtol": 0.0}
+
+    slopes = np.zeros((2, len(terms), arm.nv))  # of the energies: values, and error estimates
+    changes = np.zeros((2, len(terms) + 1, arm.nv, arm.nv))  # of the torques; last their sum
     failure = ""
-    options = {"initial_step": _step(K, moved), "order": 4, "maxiter": 6}
+    tolerances = {"atol": TOLERANCE / 10.0, "rtol": 0.0}
+    options = {"initial_step": _step(K), "order": 4, "maxiter": 6}
     try:
-        found = jacobian(derived, np.zeros(nv), tolerances=tolerances, **options)
-        both = np.array([found.df, found.error]) * scale[:, None]
+        result = jacobian(derived, np.zeros(arm.nv), tolerances=tolerances, **options)
+        both = np.array([result.df, result.error]) * scale[:, None]
+        slopes[:, known] = both[:, : len(known)]
+        changes[:, known] = both[:, len(known) :].reshape(2, -1, arm.nv, arm.nv)
+        changes[:, -1] = changes[:, :-1].sum(axis=1)
     except CdsmError as error:  # outside a law, or two sites meet
-        both = np.zeros((2, scale.size, nv))
         failure = str(error)
-    matrices = both[:, 3:].reshape(2, 5, nv, nv)
-    matrices = np.concatenate([matrices, matrices.sum(axis=1, keepdims=True)], axis=1)
-    why = [failure or (edge if name in ("passive", "joint") else "") for name in TERMS]
+    rows = [*names, "joint"]
+    torque_rows = [f"{name} torque" for name in names]
+    why = [failure or edge * (name in ("passive", "joint")) for name in rows]
     return (
-        *map(_compare, TERMS, terms, *matrices, TOLERANCE * largest, why),
-        *map(_compare, TORQUES, torques * unit, *both[:, :3], TOLERANCE * sizes, [failure] * 3),
-        _compare("batch", terms, _batch(K) * unit[:, None] * unit, 0.0, _SAME * largest[-1], ""),
+        *map(_compare, rows, matrices, *changes, TOLERANCE * sizes, why),
+        *map(_compare, torque_rows, torques, *slopes, TOLERANCE * torque_sizes, why[:-1]),
+        _batch_comparison(K, rows, matrices, _SAME * sizes[-1]),
     )
 
 
+def _terms(K: Stiffness) -> tuple[Term, ...]:
+    """Return the terms of the energy, with K's posture as their reference, in the order of K."""
+    pose = K.posture
+    stretch = Stretch(K.tension, K.cable_stiffness, K.free_lengths, pose.cable_lengths)
+    return ConstantPull(K.tension), stretch, *without_cables(pose, K.wrench, pose)
+
+
 def _compare(
-    name: str, given: Array, value: Array, error: Array | float, most: float, reason: str
+    name: str, matrix: Array, value: Array, error: Array | float, most: float, reason: str
 ) -> Comparison:
-    """Compare ``given`` with another ``value`` of the estimated ``error``."""
-    off = float(abs(given - value).max())
+    """Compare a matrix or torque with another ``value`` of the estimated ``error``."""
+    off = float(abs(matrix - value).max())
     bound = float(np.max(error))
     if not reason and most < off <= 3.0 * bound:
         reason = "the finite differences do not converge"
-    unit = "N m" if name in TORQUES else "N m/rad"
+    unit = "N m" if name.endswith("torque") else "N m/rad"
     verdict: Verdict = "not possible" if reason else "agrees" if off <= most else "DIFFERS"
-    return Comparison(name, unit, float(abs(given).max()), off, bound, verdict, reason)
+    return Comparison(name, unit, float(abs(matrix).max()), off, bound, verdict, reason)
 
 
-def _batch(K: Stiffness) -> Array:
-    """Compute the terms of K and K_θ (6, nv, nv) by :func:`cdsm.evaluate`."""
+def _batch_comparison(K: Stiffness, names: list[str], matrices: Array, most: float) -> Comparison:
+    """Compare the terms of K and K_θ (n, nv, nv) with those of :func:`cdsm.evaluate`."""
     arm = K.posture.arm
+    unit = joint_unit(K)
+    if lacking := without_kernel(arm):
+        return _compare("batch", matrices, matrices, 0.0, most, f"no kernel for {listed(lacking)}")
     slack = (K.tension == 0.0) & (K.cable_stiffness == 0.0)
     if slack.any():  # in an equilibrium, slack cables give nothing
         pairs = zip(arm.cables, slack, strict=True)
         arm = arm.with_cables([replace(b, control="force") if free else b for b, free in pairs])
     q = K.posture.q[None]
-    batch = evaluate(arm, q, K.tension, K.wrench, TERMS, check_limits=False)
-    return np.array([batch[name][0] for name in TERMS])
+    batch = evaluate(arm, q, K.tension, K.wrench, names, check_limits=False)
+    values = np.array([batch[name][0] for name in names]) * unit[:, None] * unit
+    return _compare("batch", matrices, values, 0.0, most, "")
+
+
+def _moved(K: Stiffness) -> list[int]:
+    """Return the numbers of the cables whose tension follows their length."""
+    locked = K.posture.arm.cables.position_controlled
+    moved: list[int] = np.flatnonzero(locked & (K.tension + K.cable_stiffness > 0.0)).tolist()
+    return moved
 
 
 def _edges(K: Stiffness, c: int) -> list[str]:
@@ -164,10 +172,10 @@ def _edges(K: Stiffness, c: int) -> list[str]:
     return [f"{said}, {low:g} to {high:g} N"] if near else []
 
 
-def _step(K: Stiffness, moved: list[int]) -> float:
+def _step(K: Stiffness) -> float:
     """Return the first step of the differences: small enough for all tensions."""
     rise = K.cable_stiffness * abs(K.posture.length_jacobian * joint_unit(K)).max(axis=1)
-    taut = [c for c in moved if K.tension[c] * rise[c] > 0.0]
+    taut = [c for c in _moved(K) if K.tension[c] * rise[c] > 0.0]
     return float(min([_STEP, *(_CHANGE * K.tension[taut] / rise[taut])]))
 
 
@@ -177,9 +185,6 @@ def joint_unit(K: Stiffness) -> Array:
 
 
 def _torque_sizes(K: Stiffness) -> Array:
-    """Return the largest entries (3,) [N m] of |J_L|ᵀ F, |g| and |J_X|ᵀ |W|."""
-    pose = K.posture
-    pulled = K.tension @ abs(pose.length_jacobian)
-    loaded = abs(K.wrench) @ abs(pose.jacobian)
-    torques = np.array([pulled, abs(pose.gravity_torque), loaded]) * joint_unit(K)
-    return np.asarray(torques.max(axis=1))
+    """Return the largest magnitude (n,) [N m] of the torque of each term."""
+    unit = joint_unit(K)
+    return np.array([(torque_size(term, K.posture) * unit).max() for term in _terms(K)])

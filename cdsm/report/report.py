@@ -33,8 +33,9 @@ def _faults(report: Report) -> Iterator[str]:
                 f"{each.name}: off by {each.off:.2g} {each.unit}, where the largest entry is "
                 f"{each.largest:.4g} {each.unit}. Do not use this stiffness."
             )
-    for reason in dict.fromkeys(each.reason for each in report.comparisons if each.reason):
-        names = [each.name for each in report.comparisons if each.reason == reason]
+    checks_of_k = [check for check in report.comparisons if check.name != "batch"]
+    for reason in dict.fromkeys(check.reason for check in checks_of_k if check.reason):
+        names = [check.name for check in checks_of_k if check.reason == reason]
         yield f"check not possible for {' and '.join(names)}: {reason}."
     if report.imbalance > checks.TOLERANCE:
         yield (
@@ -65,6 +66,8 @@ def _notes(report: Report) -> Iterator[str]:
         yield "the tensions were chosen for a stiffness: they are not the least."
     if arm.has_friction:
         yield f"the cables have friction; this K is frictionless, as after shaking. {_stuck(K)}"
+    if reason := next(check.reason for check in report.comparisons if check.name == "batch"):
+        yield f"not compared with cdsm.evaluate: {reason}."
     if K.wrench[3:].any():
         yield "with a moment at the tip K_θ is not symmetric: its symmetric part decides stability."
     yield from _of_limits(K)

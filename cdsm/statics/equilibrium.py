@@ -106,18 +106,17 @@ class Equilibrium(Result):
     def neutral(self) -> bool:
         """Whether a joint motion meets hardly any resistance: 1 % or less of what its terms have.
 
-        These are the magnitudes of the five terms of K_θ along the motion of its smallest
+        These are the magnitudes of the terms of K_θ along the motion of its smallest
         eigenvalue. A straight round rod beyond its buckling load rests in any direction around its
         axis; the small stiffness of a model of it is that of its joints, and holds nothing.
         """
         values, vectors = self._motions
         if not values.size:
             return False
-        v = vectors[:, 0]
-        of = np.ix_(self._free, self._free)
-        return bool(
-            values[0] <= _NEUTRAL * sum(abs(v @ each[of] @ v) for each in self.stiffness._terms)
-        )
+        motion = np.zeros(len(self.stiffness.joint))
+        motion[self._free] = vectors[:, 0]
+        resisted = sum(abs(motion @ matrix @ motion) for matrix in self.stiffness.terms.values())
+        return bool(values[0] <= _NEUTRAL * resisted)
 
     @property
     def warnings(self) -> tuple[str, ...]:

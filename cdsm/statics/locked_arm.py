@@ -14,6 +14,14 @@ from cdsm.posture import Posture
 from cdsm.statics.solve import ArmState
 from cdsm.stiffness_matrix import Stiffness, assemble
 from cdsm.support.values import Array, frozen
+from cdsm.terms import (
+    ConstantPull,
+    Stretch,
+    stiffness_of,
+    torque_of,
+    torque_size_of,
+    without_cables,
+)
 from cdsm.wires.elasticity import Elasticity, newton_in_bracket
 
 _ROUNDING = 1e-9  # a tension outside the domain of a law by at most this part is rounding
@@ -86,12 +94,9 @@ class LockedArm:
     def at_pose(self, pose: Posture) -> ArmState:
         """Compute the state at a posture."""
         F, k = self._tensions(pose)
-        J = pose.length_jacobian
-        W = self.wrench
-        g = pose.own_torque
-        K = pose._active(F) + (J.T * k) @ J + pose.own_stiffness + pose._load(W)
-        scale = F @ abs(J) + abs(g) + abs(W) @ abs(pose.jacobian)
-        return ArmState(pose, F, F @ J + g - W @ pose.jacobian, K, scale)
+        terms = ConstantPull(F), *without_cables(pose, self.wrench)
+        K = stiffness_of((*terms, Stretch(F, k)), pose)
+        return ArmState(pose, F, torque_of(terms, pose), K, torque_size_of(terms, pose))
 
     def stiffness(self, pose: Posture) -> Stiffness:
         """Return K_θ at a posture; ElasticityRangeError if a tension is outside its law."""

@@ -19,6 +19,7 @@ from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm, require_domain
 from cdsm.statics.solve import ArmState, Balance, Point, continued, settle
 from cdsm.support.values import Array, frozen
+from cdsm.terms import stiffness_of, torque_of, torque_size_of, without_cables
 
 _SHORTEST = 2.0**-8  # shortest sub-step, as a part of the step between two loads
 
@@ -154,8 +155,7 @@ class QuasiStaticArm:
     def _state(self, pose: Posture, rest_length: Array, load: Load, near: Array) -> ChainArmState:
         """Compute the state at a posture; the search for tensions starts at ``near`` (S,) [N]."""
         segments = pose.segments
-        W = load.wrench
-        g = pose.own_torque
+        terms = without_cables(pose, load.wrench)
         chains = segments.chains
         J = segments.length_jacobian
         forced = np.where(self.forced, load.motors, np.nan)
@@ -164,9 +164,10 @@ class QuasiStaticArm:
         T = chain.tension
         turning[chains.hole] = chains.friction[:, None] * segments.wrap_jacobian
         slope = chain_tangent(self.start, self.forced, chain, J, turning)
-        K = segments.active(T) + J.T @ slope + pose.own_stiffness + pose._load(W)
-        scale = T @ abs(J) + abs(g) + abs(W) @ abs(pose.jacobian)
-        return ChainArmState(pose, T, T @ J + g - W @ pose.jacobian, K, scale, chain, slope)
+        K = segments.active(T) + J.T @ slope + stiffness_of(terms, pose)
+        residual = T @ J + torque_of(terms, pose)
+        scale = T @ abs(J) + torque_size_of(terms, pose)
+        return ChainArmState(pose, T, residual, K, scale, chain, slope)
 
     def _jumps(self, state: ChainArmState) -> Array:
         """Return the work per slip (S,) [N] that the hole after each segment dissipates."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.definition import Term
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import ANOTHER_ARM
 from cdsm.posture import Posture
@@ -12,6 +13,7 @@ from cdsm.stiffness_matrix.value import Stiffness
 from cdsm.support.validation import NO_WRENCH, instance, vector, wrench_vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
+from cdsm.terms import ConstantPull, Stretch, total, without_cables
 
 
 def stiffness(
@@ -65,23 +67,16 @@ def assemble(
     free_length: Array | None = None,
 ) -> Stiffness:
     """Compute K_θ (Eq. 16) from checked, read-only arrays; :class:`Stiffness` explains them."""
-    J = pose.length_jacobian
-    gravity = pose.gravity_stiffness
-    active = frozen(pose._active(tension))
-    load = frozen(pose._load(wrench))
-    passive = frozen((J.T * cable_stiffness) @ J)
-    springs = pose.arm.springs.matrix
+    stretch = Stretch(tension, cable_stiffness)
+    summands: tuple[Term, ...] = ConstantPull(tension), stretch, *without_cables(pose, wrench)
+    terms = {term.name: frozen(term.stiffness(pose)) for term in summands}
     return Stiffness(
         posture=pose,
         tension=tension,
         wrench=wrench,
         cable_stiffness=cable_stiffness,
-        active=active,
-        passive=passive,
-        gravity=gravity,
-        load=load,
-        springs=springs,
-        joint=frozen(active + passive + gravity + load + springs),
+        terms=terms,
+        joint=frozen(total(terms.values())),
         free_length=free_length,
         distribution=distribution,
     )

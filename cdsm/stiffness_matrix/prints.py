@@ -15,15 +15,13 @@ from typing import TYPE_CHECKING, Final, Literal, final
 import numpy as np
 
 from cdsm.errors import CdsmError, SingularStiffness, listed
-from cdsm.support.format import MODEL, coordinates, rounded, span
+from cdsm.support.format import MODEL, coordinates, key, rounded, span
 from cdsm.support.values import Array
 from cdsm.tension import distribute_tension
 
 if TYPE_CHECKING:
     from cdsm.manipulator import Manipulator
     from cdsm.stiffness_matrix.value import Stiffness
-
-_PARTS = ("passive", "active", "gravity", "load", "springs")
 
 _QUANTITIES: Final = {"wire": "EA of wires", "spring": "k_series", "tension": "lower bounds"}
 # factors s that are tried, from 1 away, each row up to the first that makes the arm stable
@@ -36,6 +34,7 @@ def readings(K: Stiffness) -> dict[str, object]:
     return {
         "tip_position_m": K.posture.tip[:3, 3],
         "cable_length_m": K.posture.cable_lengths,
+        **_further_terms(K),
         "model": model_of(K),
         "along_N_per_m": [_existing(partial(K.along, u)) for u in "xyz"],
         "cartesian_N_per_m": _existing(lambda: K.cartesian),
@@ -44,6 +43,12 @@ def readings(K: Stiffness) -> dict[str, object]:
         "stable": K.is_stable,
         "remedies": {each.change: each.factor for each in K.remedies},
     }
+
+
+def _further_terms(K: Stiffness) -> dict[str, object]:
+    """Return the terms of K_θ that only this arm has."""
+    unit = K.posture.arm.stiffness_unit()
+    return {key(term.name, unit): K.terms[term.name] for term in K.posture.arm.extra_terms}
 
 
 def _existing(read: Callable[[], object]) -> object:
@@ -55,13 +60,17 @@ def _existing(read: Callable[[], object]) -> object:
 def table(K: Stiffness) -> list[str]:
     """Return the lines of the printed table: readings [N/mm] along x, y and z."""
     axes = np.eye(3)
-    parts = _PARTS if K.posture.arm.has_springs else _PARTS[:-1]
+    sprung = K.posture.arm.has_springs
+    cables = ("passive", "active")
+    terms = [name for name in K.terms if name not in cables and (sprung or name != "springs")]
+    parts = (*cables, *terms)
     rows = np.full((3 + len(parts), 3), math.nan)
     for i, u in enumerate(axes):
         with suppress(SingularStiffness):
             rows[0, i] = K.along(u)
-            of = K.shares(u)
-            rows[1:-2, i] = [np.sum(getattr(of, part)) for part in parts]
+            shares = K.shares(u)
+            sums = shares.passive.sum(), shares.active.sum(), *shares.others.values()
+            rows[1:-2, i] = sums
     mobile = np.isfinite(rows[0])
     with suppress(SingularStiffness):
         if mobile.any():

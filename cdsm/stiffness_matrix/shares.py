@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import final
 
@@ -24,9 +25,7 @@ class Shares(Result, IndexedByName, Plotted):
         direction: Unit direction (3,), base axes.
         passive: Of each cable's elasticity, (C,) [N/m].
         active: Of each cable's tension, (C,) [N/m]; usually negative.
-        gravity: Of the weight of the links [N/m].
-        load: Of the wrench at the tip [N/m].
-        springs: Of the joint springs [N/m].
+        terms: Of each other term of K_θ [N/m], by its name: gravity, load, springs, …
         model: Assumptions of the stiffness in words, such as locked motors.
         warnings: Of an unstable arm, the sentence that says so: its contributions mean nothing.
     """
@@ -39,11 +38,24 @@ class Shares(Result, IndexedByName, Plotted):
     direction: Array = field(metadata=unit("1", "axis"))
     passive: Array = field(metadata=unit("N/m", "cable"))
     active: Array = field(metadata=unit("N/m", "cable"))
-    gravity: float = field(metadata=unit("N/m"))
-    load: float = field(metadata=unit("N/m"))
-    springs: float = field(metadata=unit("N/m"))
+    terms: Mapping[str, float]
     model: str
     warnings: tuple[str, ...] = ()
+
+    @quantity("N/m")
+    def gravity(self) -> float:
+        """Contribution of the weight of the links [N/m]."""
+        return self.terms["gravity"]
+
+    @quantity("N/m")
+    def load(self) -> float:
+        """Contribution of the wrench at the tip [N/m]."""
+        return self.terms["load"]
+
+    @quantity("N/m")
+    def springs(self) -> float:
+        """Contribution of the joint springs [N/m]."""
+        return self.terms["springs"]
 
     def __getitem__(self, cable: str) -> float:
         """Return passive + active contribution of a cable [N/m], or raise InvalidInput."""
@@ -60,9 +72,9 @@ class Shares(Result, IndexedByName, Plotted):
 
     @property
     def others(self) -> dict[str, float]:
-        """Contributions of gravity, of the load and, if there are any, of the springs [N/m]."""
-        found = {"gravity": self.gravity, "load": self.load}
-        return found | {"springs": self.springs} if self.posture.arm.has_springs else found
+        """:attr:`terms` [N/m] without that of the springs, if the arm has none."""
+        sprung = self.posture.arm.has_springs
+        return {name: k for name, k in self.terms.items() if sprung or name != "springs"}
 
     @quantity("N/m")
     def total(self) -> float:

@@ -7,11 +7,11 @@ stiffness in x" then has three meanings, each with a name here: along, cartesian
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, Literal, final, get_args
+from typing import TYPE_CHECKING, Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +28,12 @@ from cdsm.support.result import Result, tabulated, unit, unit_of
 from cdsm.support.validation import Direction, one_of, unit_direction, unit_directions
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
+from cdsm.terms import CABLE_TERMS, required_torque
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Friction = Literal["frictionless", "stuck", "sliding"]
-Term = Literal["active", "passive", "gravity", "load", "springs", "joint"]
 Joints = slice | NDArray[np.intp]
 
 _ORTHOGONAL = 1e-9  # largest product of two unit directions that are orthogonal
@@ -50,13 +50,9 @@ class Stiffness(Result):
 
     Attributes:
         posture: The posture.
-        active: H_L·F (nv, nv) [N m/rad]; also called geometric.
-        passive: J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic. With friction it
-            is Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the cable segments j, not symmetric if cables slide.
-        gravity: ∂g/∂θ (nv, nv) [N m/rad].
-        load: −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment.
-        springs: Of the joint springs (nv, nv) [N m/rad]: diag k, or Sᵀ diag k S of coupled joints.
-        joint: K_θ, sum of the five terms (nv, nv) [N m/rad]: row torque, column angle.
+        terms: The terms of K_θ by name, in the order of Eq. 16, each (nv, nv) [N m/rad]: active,
+            passive, gravity, load, springs, and those of :meth:`Manipulator.with_terms`.
+        joint: K_θ, sum of the terms (nv, nv) [N m/rad]: row torque, column angle.
         tension: F (C,) [N].
         wrench: W (6,): force [N], then moment [N m].
         cable_stiffness: Diagonal of K_L (C,) [N/m], of cables without friction; 0 for
@@ -73,11 +69,7 @@ class Stiffness(Result):
     _rows = "cable"
 
     posture: Posture
-    active: Array = field(metadata=unit_of("active"))
-    passive: Array = field(metadata=unit_of("passive"))
-    gravity: Array = field(metadata=unit_of("gravity"))
-    load: Array = field(metadata=unit_of("load"))
-    springs: Array = field(metadata=unit_of("springs"))
+    terms: Mapping[str, Array]
     joint: Array = field(metadata=unit_of("joint_stiffness"))
     tension: Array = field(metadata=unit_of("tension"))
     wrench: Array = field(metadata=unit("N and N m", "component"))
@@ -87,6 +79,35 @@ class Stiffness(Result):
     friction: Friction = "frictionless"
     segment_tension: Array | None = None
     tension_gradient: Array | None = None
+
+    @tabulated
+    def active(self) -> Array:
+        """H_L·F (nv, nv) [N m/rad]; also called geometric."""
+        return self.terms["active"]
+
+    @tabulated
+    def passive(self) -> Array:
+        """J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic.
+
+        With friction it is Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the cable segments j, not symmetric if
+        cables slide.
+        """
+        return self.terms["passive"]
+
+    @tabulated
+    def gravity(self) -> Array:
+        """∂g/∂θ (nv, nv) [N m/rad]."""
+        return self.terms["gravity"]
+
+    @tabulated
+    def load(self) -> Array:
+        """−∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment."""
+        return self.terms["load"]
+
+    @tabulated
+    def springs(self) -> Array:
+        """Of the joint springs (nv, nv) [N m/rad]: diag k, or Sᵀ diag k S of coupled joints."""
+        return self.terms["springs"]
 
     @property
     def free_lengths(self) -> Array:
@@ -105,7 +126,7 @@ class Stiffness(Result):
         if self.segment_tension is not None:
             F = self.segment_tension
             J = pose.segments.length_jacobian
-        return frozen(F @ J - self.wrench @ pose.jacobian + pose.own_torque)
+        return frozen(F @ J - required_torque(pose, self.wrench))
 
     @tabulated
     def margin(self) -> float:
@@ -165,25 +186,21 @@ class Stiffness(Result):
         """
         return self.tip_response(unit_direction("direction", direction))[0]
 
-    def pseudoinverse(self, term: Term = "joint") -> Array:
+    def pseudoinverse(self, term: str = "joint") -> Array:
         """Compute J⁺ᵀ K J⁺ (3, 3) [N/m], J the linear rows of J_X: the paper's K_R, read literally.
 
         The paper's figures use it, but J⁺ allows only the joint motion of least norm: the result is
         4 % to over 100 % larger than :attr:`cartesian`. ``term`` is a part of K_θ, or ``"joint"``.
         InvalidInput if it is neither, SingularStiffness if the tip hardly moves in some direction.
         """
-        matrix: Array = getattr(self, one_of("stiffness term", term, get_args(Term)))
+        names = (*self.terms, "joint")
+        matrix = {**self.terms, "joint": self.joint}[one_of("stiffness term", term, names)]
         return frozen(readings.pseudoinverse(matrix, self._tip_motions(None)))
-
-    @property
-    def _terms(self) -> tuple[Array, ...]:
-        """The five terms of K_θ, each (nv, nv)."""
-        return self.active, self.passive, self.gravity, self.load, self.springs
 
     @property
     def _magnitudes(self) -> Array:
         """Sum of the magnitudes of the terms (nv, nv): the size of their rounding errors."""
-        return np.asarray(sum(map(abs, self._terms)))
+        return np.asarray(sum(map(abs, self.terms.values())))
 
     @cached_property
     def _inverse(self) -> Array:
@@ -262,7 +279,7 @@ class Stiffness(Result):
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
         If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ, and K_θ
-        is a sum over cables, gravity, load and springs. SingularStiffness also if it is inf.
+        is a sum over cables and other terms. SingularStiffness also if it is inf.
         """
         u = unit_direction("direction", direction)
         self.require_mobile(u)
@@ -281,9 +298,11 @@ class Stiffness(Result):
             direction=u,
             passive=frozen(passive),
             active=frozen(active),
-            gravity=float(motion @ self.gravity @ motion),
-            load=float(motion @ self.load @ motion),
-            springs=float(motion @ self.springs @ motion),
+            terms={
+                name: float(motion @ matrix @ motion)
+                for name, matrix in self.terms.items()
+                if name not in CABLE_TERMS
+            },
             model=prints.model_of(self),
             warnings=() if self.is_stable else (verdict(self),),
         )

@@ -29,6 +29,7 @@ from cdsm.support.values import Array, IndexedByName, frozen
 from cdsm.tension.infeasibility import infeasible
 from cdsm.tension.least_tensions import least_tensions
 from cdsm.tension.solvers import DEFAULT_SOLVER, OPTIMALITY, nondimensional
+from cdsm.terms import required_torque
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,9 +68,8 @@ class Tension(Result, IndexedByName):
     @quantity("torque", "joint")
     def residual(self) -> Array:
         """Residual J_Lᵀ F − (J_Xᵀ W − g) of Eq. 13, (nv,) [N m]."""
-        at = self.posture
-        torque = at.jacobian.T @ self.wrench - at.own_torque
-        return frozen(self.values @ at.length_jacobian - torque)
+        torque = self.values @ self.posture.length_jacobian
+        return frozen(torque - required_torque(self.posture, self.wrench))
 
     def keys(self) -> tuple[str, ...]:
         """Return the names of the cables, in the order of :attr:`values`."""
@@ -151,7 +151,7 @@ def distribute_tension(
         held = validation.checked_quantity(f"fixed[{name!r}]", value, "tension", zero=True)
         low, high = (frozen(np.r_[each[:c], held, each[c + 1 :]]) for each in (low, high))
     wrench = wrench_vector("wrench", wrench)
-    torque = pose.jacobian.T @ wrench - pose.own_torque
+    torque = required_torque(pose, wrench)
     problem = nondimensional(pose.length_jacobian, torque, low, high, pose.arm.length)
     solution = least_tensions(problem, solver)
     if solution.status is Status.INFEASIBLE:

@@ -11,17 +11,24 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.report.checks import TERMS, TORQUES
+from cdsm.definition import TERMS_OF_K
 from cdsm.stiffness_matrix import Report
 from cdsm.support.values import Array, frozen
 from tests.support import arms, foreign, locked
 
 STRAND = cdsm.presets.STRAND_1X19
-EVERY = (*TERMS, *TORQUES, "batch")
+TERMS = (*TERMS_OF_K, "joint")
+EVERY = (*TERMS, *(f"{name} torque" for name in TERMS_OF_K), "batch")
 
 
 def having(report: Report, verdict: str) -> set[str]:
     return {each.name for each in report.comparisons if each.verdict == verdict}
+
+
+def with_matrix(K: cdsm.Stiffness, name: str, matrix: Array) -> cdsm.Stiffness:
+    if name == "joint":
+        return replace(K, joint=frozen(matrix))
+    return replace(K, terms={**K.terms, name: frozen(matrix)})
 
 
 def with_one(pose: cdsm.Posture, tension: float) -> cdsm.Stiffness:
@@ -66,7 +73,7 @@ def test_every_wrong_term_is_found_and_named(seed: int) -> None:
         wrongs += [matrix[order][:, order]] if order.size > 2 and term != "springs" else []
         wrongs += [matrix.T.copy()] if term == "load" and order.size > 1 else []
         for wrong in wrongs:
-            report = replace(K, **{term: frozen(wrong)}).report()
+            report = with_matrix(K, term, wrong).report()
             assert having(report, "DIFFERS") == {term, "batch"}
             assert not report.passed
             assert report.faults[0].startswith(f"{term}: off by")
@@ -84,7 +91,7 @@ def test_every_wrong_term_is_found_and_named(seed: int) -> None:
 def test_arms_of_every_kind_agree(pose: cdsm.Posture) -> None:
     K = cdsm.stiffness(pose, np.linspace(20.0, 30.0, len(pose.arm.cables)))
     assert having(K.report(), "agrees") == set(EVERY), K.report().faults
-    wrong = replace(K, passive=frozen(0.9999 * K.passive))
+    wrong = with_matrix(K, "passive", 0.9999 * K.passive)
     assert "passive" in having(wrong.report(), "DIFFERS")
 
 
@@ -115,9 +122,11 @@ def test_equilibrium_is_checked_with_the_free_lengths_of_its_reference() -> None
 )
 def test_edge_of_a_law_is_not_possible(law: cdsm.Elasticity, tension: float, said: str) -> None:
     report = with_one(arms.prototype(law, 15.0)[0], tension).report()
-    assert having(report, "not possible") == {"passive", "joint"}
+    assert having(report, "not possible") == {"passive", "joint", "passive torque"}
     assert having(report, "DIFFERS") == set()
-    assert report.faults[0].startswith("check not possible for passive and joint: cable1_1")
+    assert report.faults[0].startswith(
+        "check not possible for passive and joint and passive torque: cable1_1"
+    )
     assert said in report.faults[0]
 
 
@@ -159,7 +168,7 @@ class Own(cdsm.Elasticity):
     [
         (Own(), set()),
         (Own(rigidity=1.001), {"passive", "joint"}),
-        (Own(energy=1.001), {"cable torque"}),
+        (Own(energy=1.001), {"passive torque"}),
     ],
 )
 def test_law_that_contradicts_itself_is_found(law: Own, wrong: set[str]) -> None:

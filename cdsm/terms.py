@@ -1,0 +1,267 @@
+"""Terms of the energy U(θ) of an arm: each gives its energy, torque ∂U/∂θ and stiffness ∂²U/∂θ².
+
+The torques add up to zero in balance (Eq. 13), the stiffnesses to K_θ (Eq. 16):
+
+    K_θ = H_L·F  + J_Lᵀ K_L J_L + ∂g/∂θ   − ∂(J_Xᵀ W)/∂θ + springs + further terms
+          active   passive        gravity   load
+
+The cables are two potentials: :class:`ConstantPull` is what they would give if their motors held
+the tensions, :class:`Stretch` what their elasticity adds if the motors are locked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.definition import Term
+from cdsm.joints import Springs
+from cdsm.posture import Posture
+from cdsm.routing import cross
+from cdsm.support.values import Array
+
+CABLE_TERMS = ("active", "passive")
+"""Names of the terms that depend on the tensions of the cables."""
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """Weight of the links: U = V(q)."""
+
+    name: ClassVar[str] = "gravity"
+
+    def energy(self, pose: Posture) -> float:
+        """Compute V [J]."""
+        return pose.arm.body.potential_energy(pose.q)
+
+    def torque(self, pose: Posture) -> Array:
+        """Return g = ∂V/∂θ (nv,) [N m]."""
+        return pose.gravity_torque
+
+    def stiffness(self, pose: Posture) -> Array:
+        """Return ∂g/∂θ (nv, nv) [N m/rad]."""
+        return pose.gravity_stiffness
+
+
+@dataclass(frozen=True, eq=False)
+class JointSprings:
+    """Springs at the joints: U = ½ Σ k (θ − q_0)²."""
+
+    springs: Springs
+    name: ClassVar[str] = "springs"
+
+    def energy(self, pose: Posture) -> float:
+        """Compute U [J]."""
+        return self.springs.energy(pose.q)
+
+    def torque(self, pose: Posture) -> Array:
+        """Compute k (θ − q_0) (nv,) [N m]."""
+        return self.springs.torque(pose.q)
+
+    def stiffness(self, pose: Posture) -> Array:
+        """Return diag k, or Sᵀ diag k S of coupled joints (nv, nv) [N m/rad]."""
+        return self.springs.matrix
+
+
+# slots, not frozen: a load and two terms of the cables are made with every K_θ
+@dataclass(slots=True)
+class TipLoad:
+    """Dead wrench W (6,) at the tip: U = −f·x for a force f.
+
+    A moment m has no potential. In its place is −m·φ, with the rotation φ from the ``reference``.
+    """
+
+    wrench: Array  # base axes: force [N], then moment [N m]
+    reference: Posture | None = None  # of the energy, which is zero there
+
+    def energy(self, pose: Posture) -> float:
+        """Compute U [J] against the reference."""
+        from scipy.spatial.transform import Rotation  # slow to import
+
+        assert self.reference is not None
+        start = self.reference.tip
+        turned = Rotation.from_matrix(pose.tip[:3, :3] @ start[:3, :3].T).as_rotvec()
+        moved = pose.tip[:3, 3] - start[:3, 3]
+        return float(-self.wrench[:3] @ moved - self.wrench[3:] @ turned)
+
+    def torque(self, pose: Posture) -> Array:
+        """Compute −J_Xᵀ W (nv,) [N m]."""
+        return -self.wrench @ pose.jacobian
+
+    def torque_size(self, pose: Posture) -> Array:
+        """Compute |J_X|ᵀ |W| (nv,) [N m]."""
+        return abs(self.wrench) @ abs(pose.jacobian)
+
+    def stiffness(self, pose: Posture) -> Array:
+        """Compute −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment."""
+        body = pose.arm.body
+        if body.coupling is None:
+            return load_stiffness(pose.jacobian, self.wrench, body.tip_joints)
+        v = pose.twist[:3]
+        z = pose.twist[3:]
+        jacobian = np.vstack([v + cross(z, pose.tip[:3, 3:]), z])  # of all joints
+        return body.coupling.square(load_stiffness(jacobian, self.wrench, body.tip_joints))
+
+
+@dataclass(slots=True)
+class Loads:
+    """All loads on the arm."""
+
+    loads: Sequence[TipLoad]
+    name: ClassVar[str] = "load"
+
+    def energy(self, pose: Posture) -> float:
+        """Compute the sum of the energies [J]."""
+        return sum(load.energy(pose) for load in self.loads)
+
+    def torque(self, pose: Posture) -> Array:
+        """Compute the sum of the torques (nv,) [N m]."""
+        return total(load.torque(pose) for load in self.loads)
+
+    def torque_size(self, pose: Posture) -> Array:
+        """Compute the sum of the magnitudes of the torques (nv,) [N m]."""
+        return total(load.torque_size(pose) for load in self.loads)
+
+    def stiffness(self, pose: Posture) -> Array:
+        """Compute the sum of the stiffnesses (nv, nv) [N m/rad]."""
+        return total(load.stiffness(pose) for load in self.loads)
+
+
+@dataclass(slots=True)
+class ConstantPull:
+    """Cables that pull with constant tensions F (C,) [N], as weights over pulleys: U = F·L."""
+
+    tension: Array
+    name: ClassVar[str] = "active"
+
+    def energy(self, pose: Posture) -> float:
+        """Compute F·L [J]."""
+        return float(self.tension @ pose.cable_lengths)
+
+    def torque(self, pose: Posture) -> Array:
+        """Compute J_Lᵀ F (nv,) [N m]."""
+        return self.tension @ pose.length_jacobian
+
+    def torque_size(self, pose: Posture) -> Array:
+        """Compute |J_L|ᵀ F (nv,) [N m]."""
+        return self.tension @ abs(pose.length_jacobian)
+
+    def stiffness(self, pose: Posture) -> Array:
+        """Compute H_L·F (nv, nv) [N m/rad]."""
+        routing = pose.arm.routing
+        return np.asarray(routing.hessian(pose.spans, self.tension[routing.cable]))
+
+
+@dataclass(slots=True)
+class Stretch:
+    """What locked motors add: U = ∫(F(L) − F_0) dL, with the tensions F_0 where K_θ is computed.
+
+    ``free_length`` and ``length`` are needed for energy and torque, ``cable_stiffness`` for the
+    stiffness, which is that at F_0.
+    """
+
+    tension: Array  # F_0 (C,) [N]
+    cable_stiffness: Array  # dF/dL (C,) [N/m] at F_0
+    free_length: Array | None = None  # l_0 (C,) [m]
+    length: Array | None = None  # L (C,) [m] at F_0
+    _last: tuple[Posture, tuple[Array, Array]] | None = None  # energy, then torque are asked for
+    name: ClassVar[str] = "passive"
+
+    def energy(self, pose: Posture) -> float:
+        """Compute U [J]."""
+        return float(self._follow(pose)[1].sum())
+
+    def torque(self, pose: Posture) -> Array:
+        """Compute J_Lᵀ (F − F_0) (nv,) [N m]."""
+        return (self._follow(pose)[0] - self.tension) @ pose.length_jacobian
+
+    def torque_size(self, pose: Posture) -> Array:
+        """Compute |J_L|ᵀ F_0 (nv,) [N m]."""
+        return self.tension @ abs(pose.length_jacobian)
+
+    def stiffness(self, pose: Posture) -> Array:
+        """Compute J_Lᵀ K_L J_L (nv, nv) [N m/rad]."""
+        J = pose.length_jacobian
+        return (J.T * self.cable_stiffness) @ J
+
+    def _follow(self, pose: Posture) -> tuple[Array, Array]:
+        """Compute the tensions F (C,) [N] and the energies (C,) [J] of the cables at a posture."""
+        assert self.free_length is not None
+        assert self.length is not None
+        if self._last is None or self._last[0] is not pose:
+            taut = self.tension + self.cable_stiffness > 0.0
+            longer = np.where(taut, pose.cable_lengths - self.length, 0.0)
+            F, energy = pose.arm.laws.stretched(self.tension, self.free_length, longer)
+            self._last = pose, (F, energy - self.tension * longer)
+        return self._last[1]
+
+
+def load_stiffness(jacobian: Array, wrench: Array, tip_joints: NDArray[np.intp]) -> Array:
+    """Compute −∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench W (6,) at the tip, from J_X (6, nv).
+
+    Let joint a be before b on the way to the tip. A force f gives −(f × z_a)·v_b in the entries
+    (a, b) and (b, a); a moment m gives −(m × z_a)·z_b in the entry (b, a) alone.
+    """
+    load = np.zeros((jacobian.shape[1],) * 2)
+    if wrench.any():
+        v, z = np.split(jacobian[:, tip_joints], 2)
+        later = np.tri(len(tip_joints), k=-1)
+        force = (1.0 - later) * (cross(z, wrench[:3, None]).T @ v)
+        moment = later * (cross(z, wrench[3:, None]).T @ z)
+        load[np.ix_(tip_joints, tip_joints)] = force + force.T * later - moment
+    return load
+
+
+def without_cables(
+    pose: Posture, wrench: Array, reference: Posture | None = None
+) -> tuple[Term, ...]:
+    """Return all terms but those of the cables: gravity, load, springs, and those of the arm's own.
+
+    W (6,) is the ``wrench`` at the tip, ``reference`` the posture from which its work counts.
+    """
+    gravity, *others = pose.arm.terms
+    return gravity, Loads((TipLoad(wrench, reference),)), *others
+
+
+def torque_of(terms: Iterable[Term], pose: Posture) -> Array:
+    """Compute the sum of the torques of ``terms`` (nv,) [N m]."""
+    return total(term.torque(pose) for term in terms)
+
+
+def torque_size_of(terms: Iterable[Term], pose: Posture) -> Array:
+    """Compute the sum of the magnitudes of their torques (nv,) [N m], which sets the rounding."""
+    return total(torque_size(term, pose) for term in terms)
+
+
+def torque_size(term: Term, pose: Posture) -> Array:
+    """Compute the magnitude of a torque (nv,) [N m]: of a sum of products, that of each product."""
+    size = getattr(term, "torque_size", None)
+    return abs(term.torque(pose)) if size is None else size(pose)
+
+
+def stiffness_of(terms: Iterable[Term], pose: Posture) -> Array:
+    """Compute the sum of the stiffnesses of ``terms`` (nv, nv) [N m/rad]."""
+    return total(term.stiffness(pose) for term in terms)
+
+
+def required_torque(pose: Posture, wrench: Array) -> Array:
+    """Compute the torque J_Lᵀ F (nv,) [N m] by which the cables balance the arm.
+
+    It is J_Xᵀ W − g (Eq. 13), less the torques of springs and further terms.
+    """
+    return -torque_of(without_cables(pose, wrench), pose)
+
+
+def total(parts: Iterable[Array]) -> Array:
+    """Compute the sum of arrays of one shape, in their order."""
+    first, *others = parts
+    if not others:
+        return first
+    result = first + others[0]
+    for part in others[1:]:
+        result += part  # in place, which is faster
+    return result
