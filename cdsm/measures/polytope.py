@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.errors import CdsmError, InvalidInput, solver_failed
 from cdsm.posture import Posture
 from cdsm.status import Status
-from cdsm.support.format import coordinates
+from cdsm.support.format import coordinates, plural
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, instance, wrench_vector
 from cdsm.support.values import Array, Plotted, frozen
@@ -90,10 +90,9 @@ class ForcePolytope(Result, Plotted):
         return float(abs(np.linalg.det(corners)).sum()) / 6.0
 
     def __str__(self) -> str:
-        return (
-            f"{len(self.vertices)} vertices; holds {self.radius:.4g} N in any direction, least "
-            f"along {coordinates(self.worst_direction, '.3g')}"
-        )
+        corners = plural(len(self.vertices), "corner")
+        direction = coordinates(self.worst_direction, ".3g")
+        return f"{corners}; holds {self.radius:.4g} N in any direction, least along {direction}"
 
 
 def force_polytope(
@@ -146,12 +145,17 @@ def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForceP
     point along the normal of each facet, and repeat until no point is outside.
     """
     axes, size, _ = np.linalg.svd(pose.jacobian[:3])
-    k = int((size > _NO_MOTION * pose.arm.length).sum())
-    basis = axes[:, :k]
-    unbounded = axes[:, k:].T
+    moved = int((size > _NO_MOTION * pose.arm.length).sum())
+    basis = axes[:, :moved]
+    unbounded = axes[:, moved:].T
     farthest = balanced(pose, basis, wrench, low, high)
-    if not farthest(np.zeros(k)).ok:
+    some = farthest(np.zeros(moved))
+    if not some.ok:
         return None
+    varied, fixed = split_forces(pose, basis)
+    constant = fixed.T @ some.x
+    constant[abs(constant) <= _OUTSIDE * high.max()] = 0.0
+    k = varied.shape[1]
     points = np.zeros((0, k))
     normals = np.vstack([np.eye(k), -np.eye(k)])
     tried: set[tuple[float, ...]] = set()
@@ -163,10 +167,11 @@ def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForceP
             seen = tuple(np.round(normal, 9).tolist())
             if seen not in tried:
                 tried.add(seen)
-                solution = farthest(normal)
+                solution = farthest(varied @ normal)
                 if not solution.ok:
                     raise solver_failed("highs", "finds no end of the balanced forces.")
-                new += [solution.x] if solution.x @ normal > known + least else []
+                point = solution.x @ varied
+                new += [point] if point @ normal > known + least else []
         if not new:
             break
         points = np.vstack([points, *new])
@@ -175,17 +180,35 @@ def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForceP
         corners = np.zeros(1, np.intp)
         faces = np.zeros((0, 3), np.intp)
         points = np.zeros((1, 0))
+    offsets = (normals @ points.T).max(axis=1, initial=-math.inf)
     return ForcePolytope(
         posture=pose,
         wrench=wrench,
         minimum=low,
         maximum=high,
-        vertices=frozen(points[corners] @ basis.T),
+        vertices=frozen((points[corners] @ varied.T + fixed @ constant) @ basis.T),
         faces=frozen(faces),
-        normals=frozen(normals @ basis.T),
-        offsets=frozen((normals @ points.T).max(axis=1, initial=-math.inf)),
+        normals=frozen(np.vstack([normals @ varied.T, fixed.T, -fixed.T]) @ basis.T),
+        offsets=frozen(np.concatenate([offsets, constant, 0.0 - constant])),
         unbounded=frozen(unbounded),
     )
+
+
+def split_forces(pose: Posture, U: Array) -> tuple[Array, Array]:
+    """Split the forces x (k,) along U (3, k) by whether changes of the tensions can balance them.
+
+    Returns orthonormal columns x with J_Lᵀ F = J_vᵀ U x for some F, and the others. An arm with
+    fewer cables than joints can vary few forces, or none.
+    """
+    count = U.shape[1]
+    arms, size, _ = np.linalg.svd(pose.length_jacobian.T, full_matrices=False)
+    arms = arms[:, size > _NO_MOTION * size.max(initial=0.0)]
+    torque = pose.jacobian[:3].T @ U
+    size, axes = np.linalg.svd(torque - arms @ (arms.T @ torque))[1:]
+    fixed = int((size > _NO_MOTION * pose.arm.length).sum())
+    if not fixed:
+        return np.eye(count), np.zeros((count, 0))
+    return axes[fixed:].T, axes[:fixed].T
 
 
 def _hull(points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:

@@ -27,7 +27,8 @@ from cdsm.tension import distribute_tension
 SAMPLES = 200  # bounds or load factors of a scan: a stable range narrower than a step is not seen
 _PRECISION = 1e-12  # relative precision of a critical bound or load factor
 _ABOVE = 1.0 + 1e-9  # just above the low end of a law: rounding may put a tension below its bound
-_LOWEST, _LARGEST = 1e-3, 1e6  # lowest bound of a scan from zero [N]; end of doubled load factors
+_LOWEST = 1e-3  # lowest bound of a scan from zero [N]; or over its end, if that is below it
+_LARGEST = 1e6  # end of doubled load factors
 _ROUNDING = 1e-7  # a smaller factor is that of the balance, which solvers accept to 1e-9
 _SHOWN = 10.0  # largest load factor of the curve if the critical one is infinite
 Limit = Literal["buckling", "infeasible", "elasticity", "none"]
@@ -179,9 +180,10 @@ def critical_tension(
     low = max((law.low for law in laws), default=0.0) * _ABOVE
     ends = [*(law.high for law in laws), *(each.maximum for each in arm.cables)]
     high = max(min([*ends, checked_quantity("up_to", up_to, "tension")]), low)
-    first = max(low, _LOWEST)
     at(low)  # raises the reason if no tensions balance the arm
-    bounds = np.unique([low, *np.geomspace(first, max(high, first), SAMPLES - 1)])
+    first = max(low, _LOWEST if high > _LOWEST else _LOWEST * high)
+    scan = np.geomspace(first, high, SAMPLES - 1) if high > low else np.zeros(0)
+    bounds = np.unique([low, *scan])
     margins = _margins(pose, bounds[:, None], math.inf, W)
     n = int(np.append(np.isfinite(margins), False).argmin())  # bounds that balance the arm
     if n < bounds.size:

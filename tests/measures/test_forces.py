@@ -129,6 +129,32 @@ def test_where_the_tip_cannot_move_the_links_hold_any_force() -> None:
     assert side.force == pytest.approx(polytope.radius, rel=1e-7)
 
 
+def test_a_balanced_arm_with_fewer_cables_than_joints_holds_no_force() -> None:
+    arm = cdsm.presets.nitinol_segment(gravity=(0.0, 0.0, -9.81))
+    random = np.random.default_rng(0)
+    for _ in range(4):
+        pose = cdsm.forward_statics(arm, tension=random.uniform(0.0, 4.0, 3)).pose
+        polytope = cdsm.force_polytope(pose, maximum=100.0)
+        np.testing.assert_array_equal(polytope.vertices, np.zeros((1, 3)))
+        assert (polytope.radius, polytope.volume) == (0.0, 0.0)
+        assert cdsm.payload(pose, "z", maximum=100.0).limits["tension"] == 0.0
+
+
+def test_a_hinge_without_cables_holds_only_forces_through_it() -> None:
+    whole = hinge(0.9, joints=2, base_length=0.04, hole_radius=0.02, gravity=(0.0, 0.0, 0.0))
+    pose = whole.with_cables(whole.cables[:2]).at([0.3, 0.4])
+    polytope = cdsm.force_polytope(pose, 5.0, 45.0)
+    along = pose.tip[:3, 3] - pose.link_pose("link2")[:3, 3]
+    along /= np.linalg.norm(along)
+    assert polytope.vertices.shape == (2, 3)
+    np.testing.assert_allclose(np.cross(polytope.vertices, along), 0.0, atol=1e-9)
+    assert polytope.radius == 0.0
+    # balance of the first hinge, with one cable at its upper bound and one at its lower bound
+    torques = np.array([[5.0, 45.0], [45.0, 5.0]]) @ pose.length_jacobian[:, 0]
+    forces = torques / (pose.jacobian[:3, 0] @ along)
+    np.testing.assert_allclose(np.sort(polytope.vertices @ along), np.sort(forces), rtol=1e-9)
+
+
 def test_a_pair_holds_a_segment_of_forces() -> None:
     pose = hinge(hole_radius=0.02).at([0.0])
     polytope = cdsm.force_polytope(pose, 10.0, 110.0)

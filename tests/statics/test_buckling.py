@@ -64,6 +64,14 @@ def test_wire_at_the_end_of_its_elasticity_says_so() -> None:
     assert found.tension.max() == pytest.approx(810.0, rel=1e-9)
 
 
+@pytest.mark.parametrize("up_to", [1e-5, 1e-3, 2e-3])
+def test_no_bound_beyond_the_end_of_the_scan_is_examined(up_to: float) -> None:
+    found = cdsm.critical_tension(pair(), up_to=up_to)
+    assert found.examined == (0.0, up_to)
+    assert found.bounds[[0, -1]] == pytest.approx([0.0, up_to], rel=1e-12)
+    assert found.stable == ((0.0, pytest.approx(up_to)),)
+
+
 def soft_arms() -> list[cdsm.Posture]:
     geometries = [
         mixed_arm().geometry,
