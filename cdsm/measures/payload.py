@@ -9,7 +9,7 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.measures.polytope import balanced, force_polytope, split_forces
+from cdsm.measures.polytope import Farthest, balanced, force_polytope
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
@@ -129,7 +129,7 @@ def payload(
     def limits(u: Array) -> dict[str, float]:
         yields = float(np.linalg.norm(C @ u))
         locked = allowed / yields if yields > 0.0 else math.inf
-        tension = largest_force(pose, u, W, low, high)
+        tension = largest_force(balanced(pose, u[:, None], W, low, high))
         return {"tension": tension, "deflection": locked if K.is_stable else 0.0}
 
     if direction is not None:
@@ -142,15 +142,9 @@ def payload(
     return Payload(posture=pose, direction=frozen(u), worst=True, limits=found)
 
 
-def largest_force(pose: Posture, direction: Array, wrench: Array, low: Array, high: Array) -> float:
-    """Return the largest force [N] along a direction (3,) that tensions balance; 0 if none.
-
-    It acts besides ``wrench`` (6,); ``low`` and ``high`` (C,) [N] are the bounds of the tensions.
-    """
-    along = direction[:, None]
-    if not split_forces(pose, along)[0].size:
-        return 0.0
-    solution = balanced(pose, along, wrench, low, high)(np.ones(1))
+def largest_force(farthest: Farthest) -> float:
+    """Return the largest force [N] along the one direction of ``farthest``; 0 if there is none."""
+    solution = farthest(np.ones(1))
     if solution.status is Status.UNBOUNDED:
         return math.inf
     return max(float(solution.x[0]), 0.0) if solution.ok else 0.0

@@ -19,7 +19,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.measures.clearance import KINDS, distances
 from cdsm.measures.indices import principal_stiffness, tension_factor
 from cdsm.measures.payload import largest_force
-from cdsm.measures.polytope import polytope_of
+from cdsm.measures.polytope import balanced, polytope_of
 from cdsm.posture import Posture
 from cdsm.quantities import names_of
 from cdsm.status import Status
@@ -210,8 +210,8 @@ class Cases:
         """Compute the largest forces [N] that tensions within the bounds balance; 0 if none."""
         found: dict[str, Any] = {}
         if "payload" in self.outputs:
-            forces = [largest_force(pose, u, wrench, low, high) for u in self.direction]
-            found["payload"] = forces
+            ways = (balanced(pose, u[:, None], wrench, low, high) for u in self.direction)
+            found["payload"] = [largest_force(each) for each in ways]
         if "force_radius" in self.outputs:
             polytope = polytope_of(pose, wrench, low, high)
             found["force_radius"] = polytope.radius if polytope else 0.0
