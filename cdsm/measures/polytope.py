@@ -154,6 +154,7 @@ def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForceP
         return None
     varied, fixed = _split_forces(pose, basis)
     constant = fixed.T @ some.x
+    constant[abs(constant) <= _OUTSIDE * high.max()] = 0.0
     k = varied.shape[1]
     points = np.zeros((0, k))
     normals = np.vstack([np.eye(k), -np.eye(k)])
@@ -241,9 +242,9 @@ The status is UNBOUNDED if nothing bounds a · x, and INFEASIBLE if no force is 
 def balanced(pose: Posture, U: Array, wrench: Array, low: Array, high: Array) -> Farthest:
     """Return the function that maximises over the forces along U that a posture balances.
 
-    ``low`` and ``high`` (C,) [N] are the bounds of the tensions, ``wrench`` is W (6,). A force that
-    no change of the tensions can balance, and that is rounding, is zero. The function raises
-    CdsmError if its linear program fails.
+    ``low`` and ``high`` (C,) [N] are the bounds of the tensions, ``wrench`` is W (6,). Forces that
+    are rounding are zero if no change of the tensions varies them. The function raises CdsmError if
+    its linear program fails.
     """
     A = np.column_stack([pose.length_jacobian.T, -pose.jacobian[:3].T @ U])
     lever = abs(A).max(axis=1)
@@ -258,8 +259,7 @@ def balanced(pose: Posture, U: Array, wrench: Array, low: Array, high: Array) ->
     A[:, count:] /= scale
     force = float((high if np.isfinite(high).all() else np.append(low, abs(b))).max()) or 1.0
     bounds = np.append(low / force, -free), np.append(high / force, free)
-    fixed = _split_forces(pose, U)[1]
-    rounding = _OUTSIDE * force
+    rounding = 0.0 if _split_forces(pose, U)[0].size else _OUTSIDE * force
 
     def farthest(along: Array) -> Solution:
         cost = np.append(np.zeros(count), along / scale)
@@ -267,7 +267,6 @@ def balanced(pose: Posture, U: Array, wrench: Array, low: Array, high: Array) ->
         if solution.status is Status.SOLVER_FAILED:
             raise solver_failed("highs", f"finds no largest load: {solution.message}")
         x = solution.x[count:] / scale * force
-        constant = fixed.T @ x
-        return replace(solution, x=x - fixed @ np.where(abs(constant) <= rounding, constant, 0.0))
+        return replace(solution, x=np.where(abs(x) <= rounding, 0.0, x))
 
     return farthest
