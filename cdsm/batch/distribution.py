@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch.quantities import Codes, OfPostures
-from cdsm.batch.solution import Rows
+from cdsm.batch.rows import Rows
+from cdsm.batch.solution import solve_rows
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import WRENCH, flag, instance, number_array, whole_number
@@ -80,7 +81,6 @@ def distribute_tensions(
     angles = postures(arm, q)
     low, high = checked_bounds(arm, minimum, maximum, len(angles))
     loads = given_wrench(wrench, len(angles))
-    status = np.zeros(len(angles), dtype=np.uint8)
     rows = Rows(
         arm=arm,
         q=angles,
@@ -89,11 +89,11 @@ def distribute_tensions(
         bounds=(np.atleast_2d(low), np.atleast_2d(high)),
         check_limits=flag("check_limits", check_limits),
     )
-    values = rows.solve(status, checked_threads(threads))["tension"]
+    quantities, status = solve_rows(rows, checked_threads(threads))
     return Tensions(
         arm=arm,
         q=angles,
-        values=frozen(values),
+        values=frozen(quantities["tension"]),
         wrench=loads,
         minimum=low,
         maximum=high,

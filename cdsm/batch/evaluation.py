@@ -18,11 +18,11 @@ from cdsm.batch.distribution import (
     postures,
 )
 from cdsm.batch.quantities import Codes, OfPostures
-from cdsm.batch.solution import Rows
+from cdsm.batch.rows import Rows
+from cdsm.batch.solution import solve_rows
 from cdsm.errors import InvalidInput, unknown
 from cdsm.manipulator import ANOTHER_ARM, Manipulator
 from cdsm.quantities import QUANTITIES, require_name
-from cdsm.status import Status
 from cdsm.support.format import coordinates
 from cdsm.support.status import summary
 from cdsm.support.validation import Direction, flag, instance, unit_directions
@@ -149,7 +149,7 @@ def evaluate(
     rows = len(angles)
     if (direction is None) != ("along" not in names):
         raise InvalidInput("direction", "belongs to the output along: give both, or neither.")
-    given, loads, status = _checked_load(arm, angles, tension, wrench)
+    given, loads, lost = _checked_load(arm, angles, tension, wrench)
     bounds = None
     if minimum is not None:
         if given is not None:
@@ -163,10 +163,8 @@ def evaluate(
             "tension",
             f"{needy[0]!r} depends on it: give tension=, or minimum= to have it distributed.",
         )
-    if not needy:
-        status[:] = Status.OK
     u = None if direction is None else unit_directions("direction", direction)
-    solved = Rows(
+    asked = Rows(
         arm=arm,
         q=angles,
         wrench=np.atleast_2d(loads),
@@ -175,7 +173,9 @@ def evaluate(
         bounds=(np.atleast_2d(bounds[0]), np.atleast_2d(bounds[1])) if bounds and needy else None,
         directions=np.zeros((0, 3)) if u is None else u.reshape(-1, 3),
         check_limits=flag("check_limits", check_limits),
-    ).solve(status, checked_threads(threads))
+        status=lost if needy else None,
+    )
+    solved, status = solve_rows(asked, checked_threads(threads))
     if u is not None and u.ndim == 1:
         solved["along"] = solved["along"][:, 0]
     return Batch(
@@ -204,15 +204,15 @@ def _checked_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
 
 def _checked_load(
     arm: Manipulator, q: Array, tension: Tensions | ArrayLike | None, wrench: ArrayLike | None
-) -> tuple[Array | None, Array, Codes]:
-    """Return checked tensions (None if not given) and wrench, and the status (B,) so far."""
+) -> tuple[Array | None, Array, Codes | None]:
+    """Return checked tensions (None if not given) and wrench, and the status (B,) of theirs."""
     if not isinstance(tension, Tensions):
         given = None if tension is None else given_tension(arm, tension, len(q))
-        return given, given_wrench(wrench, len(q)), np.zeros(len(q), dtype=np.uint8)
+        return given, given_wrench(wrench, len(q)), None
     if not np.array_equal(tension.q, q):
         raise InvalidInput("tension", "was distributed at other postures; distribute it at these.")
     if tension.arm != arm:
         raise InvalidInput("tension", f"was distributed for {ANOTHER_ARM}")
     if wrench is not None:
         raise InvalidInput("wrench", "comes with the Tensions; leave it out here.")
-    return tension.values, tension.wrench, tension.status.copy()
+    return tension.values, tension.wrench, tension.status

@@ -1,73 +1,82 @@
-"""Arrays of an arm for the kernels, and postures side by side."""
+"""Rows of a batch: what is asked, arrays of the arm for the kernels, and postures side by side.
+
+A row is a posture, possibly of a variant of the arm.
+"""
 
 from __future__ import annotations
 
 import math
-from functools import cache, lru_cache
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
+from functools import cache, lru_cache, partial
 from itertools import combinations
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.batch.quantities import Codes
 from cdsm.errors import InvalidInput, listed
 from cdsm.manipulator import Manipulator
+from cdsm.routing import Indices
 from cdsm.support.values import Array, frozen
 from cdsm.tension.solvers import NO_ARM
 
-Indices = NDArray[np.intp]
+CableStiffness = Callable[[Array, Array, slice], Array]
+"""Stiffness (n, C) of cables of lengths L (n, C) under F (n, C) in a slice of rows; −1 outside."""
+
 _Scalar = TypeVar("_Scalar", np.float64, np.bool_)
 
 
-class Arm(NamedTuple):
-    """What all arms of a batch share: nv joints, C cables, S segments between their sites."""
+class ArmArrays(NamedTuple):
+    """What all variants of an arm share: n joints, C cables, S segments between their sites."""
 
-    parent: NDArray[np.intp]  # frame before each joint (nv,)
-    turn: Array  # A, B, C (nv, 3, 3, 3): a joint turns its frame by A + B cos q + C sin q
-    axis: Array  # of joints that turn, in the frame before (nv, 3); else zero
-    slide: Array  # of joints that slide, in the frame before (nv, 3); else zero
-    free: Array  # angle of each joint at which its spring has no torque (nv,)
-    moves: NDArray[np.bool_]  # whether joint i moves what joint j carries (nv of j, nv of i)
-    frame: NDArray[np.intp]  # frame of each site (P,)
-    ends: NDArray[np.intp]  # cable, first and second site of each segment (S, 3)
-    path: NDArray[np.intp]  # joints from the first to the second site (S, m)
+    parent: Indices  # frame before each joint (n,)
+    turn: Array  # A, B, C (n, 3, 3, 3): a joint turns its frame by A + B cos q + C sin q
+    axis: Array  # of joints that turn, in the frame before (n, 3); else zero
+    slide: Array  # of joints that slide, in the frame before (n, 3); else zero
+    free: Array  # angle of each joint at which its spring has no torque (n,)
+    moves: NDArray[np.bool_]  # whether joint i moves what joint j carries (n of j, n of i)
+    frame: Indices  # frame of each site (P,)
+    ends: Indices  # cable, first and second site of each segment (S, 3)
+    path: Indices  # joints from the first to the second site (S, m)
     sign: Array  # −1 for joints on the way up, then 1 (S, m); 0 for padding
-    pulls: NDArray[np.bool_]  # whether a cable can turn a joint (C, nv)
+    pulls: NDArray[np.bool_]  # whether a cable can turn a joint (C, n)
     tip: int  # frame of the tip
     tip_rotation: Array  # (3, 3)
     gravity: Array  # (3,) [m/s²]
     least: float  # moment arms below this are rounding [m]
-    axes: NDArray[np.intp]  # joints of the K blocks of the kernel guess, from base to tip (nv,)
-    axis_ends: NDArray[np.intp]  # where each block begins in axes, and the last ends (K+1,)
-    cables: NDArray[np.intp]  # cables of the blocks (C,)
-    cable_ends: NDArray[np.intp]  # the same in cables (K+1,)
-    pairs: NDArray[np.intp]  # two cables of one block (N, 2), any second one for a single axis
-    pair_ends: NDArray[np.intp]  # the same in pairs (K+1,)
+    axes: Indices  # joints of the K blocks of the kernel guess, from base to tip (n,)
+    axis_ends: Indices  # where each block begins in axes, and the last ends (K+1,)
+    cables: Indices  # cables of the blocks (C,)
+    cable_ends: Indices  # the same in cables (K+1,)
+    pairs: Indices  # two cables of one block (N, 2), any second one for a single axis
+    pair_ends: Indices  # the same in pairs (K+1,)
 
 
-class Body(NamedTuple):
-    """Dimensions, which each posture may have of its own: blocks first (1 for all, or B)."""
+class BodyArrays(NamedTuple):
+    """Dimensions of an arm, (1, …, W) for all postures, or (B, …, W): each has its own."""
 
-    shift: Array  # origin of each joint in the frame before (B, nv, 3, W) [m]
+    shift: Array  # origin of each joint in the frame before (B, n, 3, W) [m]
     site: Array  # (B, P, 3, W) [m]
-    centre: Array  # of mass of what each frame carries (B, nv+1, 3, W) [m]
+    centre: Array  # of mass of what each frame carries (B, n+1, 3, W) [m]
     tip: Array  # (B, 3, W) [m]
-    mass: Array  # (B, nv+1, W) [kg]
+    mass: Array  # (B, n+1, W) [kg]
     fixed: Array  # length of cables that no joint changes (B, C, W) [m]
-    spring: Array  # stiffness of the spring of each joint (B, nv, W)
+    spring: Array  # stiffness of the spring of each joint (B, n, W)
 
 
-class Pose(NamedTuple):
-    """What the kernel pose finds in B blocks of W postures."""
+class PoseArrays(NamedTuple):
+    """What the kernel ``pose`` computes of B blocks of W postures."""
 
     length: Array  # L (B, C, W) [m]
-    jacobian: Array  # J_L (B, C, nv, W)
-    gravity: Array  # g (B, nv, W)
-    torque: Array  # J_Xᵀ W − g, which the cables balance (B, nv, W)
-    tip_jacobian: Array  # J_X, linear and angular part (B, 2, nv, 3, W)
+    jacobian: Array  # J_L (B, C, n, W)
+    gravity: Array  # g (B, n, W)
+    torque: Array  # J_Xᵀ W − g, which the cables balance (B, n, W)
+    tip_jacobian: Array  # J_X, linear and angular part (B, 2, n, 3, W)
     tip: Array  # rotation and position of the tip (B, 4, 3, W)
-    axis: Array  # z (B, nv, 3, W)
-    moved: Array  # Σ m ∂c/∂θ_j over the masses that each joint moves (B, nv, 3, W)
+    axis: Array  # z (B, n, 3, W)
+    moved: Array  # Σ m ∂c/∂θ_j over the masses that each joint moves (B, n, 3, W)
     segment: Array  # direction, and 1/length of each segment (B, S, 4, W)
     motion: Array  # d of each joint of each segment (B, S, m, 3, W)
     shortest: Array  # length of the shortest segment (B, W) [m]
@@ -81,14 +90,47 @@ def without_kernel(arm: Manipulator) -> list[str]:
     return [term.name for term in arm.terms if term.name not in _KERNELS]
 
 
-class ArmRows:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Rows:
+    """Postures of an arm, loads, and what is given or asked of them; all is checked.
+
+    An array of loads, tensions or bounds has one row for all, or one for each posture.
+
+    Attributes:
+        arm: The arm.
+        q: Joint angles (N, nv).
+        wrench: W (N, 6).
+        names: The quantities to compute.
+        tension: Given F (N, C) [N], or None.
+        bounds: Lower and upper bounds of F to distribute, (N, C) each [N], or None.
+        directions: Unit vectors (D, 3) of ``along``.
+        body: Dimensions of each row, rows first; those of the arm by default.
+        cable_stiffness: That of each row; by default that of the arm's cables.
+        check_limits: Whether rows beyond the joint limits are skipped.
+        status: :class:`Status` (N,) of rows that are lost already; by default none is.
+    """
+
+    arm: Manipulator
+    q: Array
+    wrench: Array
+    names: Collection[str]
+    tension: Array | None = None
+    bounds: tuple[Array, Array] | None = None
+    directions: Array = field(default_factory=partial(np.zeros, (0, 3)))
+    body: BodyArrays | None = None
+    cable_stiffness: CableStiffness | None = None
+    check_limits: bool = True
+    status: Codes | None = None
+
+
+class ArmTables:
     """Arrays of an arm; its joints are in Pinocchio's order, each after its parent.
 
     Attributes:
         coupling: How the n joints follow from those of q; None: they are those of q.
         arm: What all variants of the arm share.
-        shapes: Of the arrays of :class:`Pose`, for one posture.
-        dimensions: Those of the arm: a :class:`Body` without axes of blocks and postures.
+        shapes: Of the arrays of :class:`PoseArrays`, for one posture.
+        dimensions: Those of the arm: a :class:`BodyArrays` without axes of blocks and postures.
     """
 
     def __init__(self, arm: Manipulator) -> None:
@@ -98,10 +140,10 @@ class ArmRows:
         tree = arm.body.arrays()
         routing = arm.routing
         parent = tree.parent[1:]
-        nv = len(parent)
+        n = len(parent)
         self.coupling = arm.body.coupling
-        moves = np.eye(nv, dtype=np.bool_)
-        for j in range(nv):
+        moves = np.eye(n, dtype=np.bool_)
+        for j in range(n):
             if parent[j]:
                 moves[j] |= moves[parent[j] - 1]
         axis = tree.twist[1:, 3:]
@@ -113,9 +155,9 @@ class ArmRows:
         ends = np.stack([routing.cable, routing.first, routing.second], axis=1)
         real = routing.sign != 0.0
         path = np.where(real, routing.path, 0)
-        pulls = np.zeros((len(arm.cables), nv), dtype=np.bool_)
+        pulls = np.zeros((len(arm.cables), n), dtype=np.bool_)
         pulls[np.broadcast_to(ends[:, :1], path.shape)[real], path[real]] = True
-        self.arm = Arm(
+        self.arm = ArmArrays(
             parent=frozen(parent),
             turn=frozen(rotation[:, None] @ np.stack([about, np.eye(3) - about, cross], axis=1)),
             axis=frozen((rotation @ axis[:, :, None])[:, :, 0].copy()),
@@ -131,9 +173,9 @@ class ArmRows:
             tip_rotation=frozen(tree.tip_rotation),
             gravity=frozen(np.array(arm.gravity)),
             least=NO_ARM * arm.length,
-            **(_found([], []) if self.coupling else _blocks(pulls)),
+            **(_block_arrays([], []) if self.coupling else _blocks(pulls)),
         )
-        self.dimensions = Body(
+        self.dimensions = BodyArrays(
             shift=tree.translation[1:],
             site=routing.point,
             centre=tree.centre,
@@ -147,34 +189,34 @@ class ArmRows:
         (S, m) = path.shape
         self.shapes: dict[str, tuple[int, ...]] = {
             "length": (C,),
-            "jacobian": (C, nv),
-            "gravity": (nv,),
-            "torque": (nv,),
-            "tip_jacobian": (2, nv, 3),
+            "jacobian": (C, n),
+            "gravity": (n,),
+            "torque": (n,),
+            "tip_jacobian": (2, n, 3),
             "tip": (4, 3),
-            "axis": (nv, 3),
-            "moved": (nv, 3),
+            "axis": (n, 3),
+            "moved": (n, 3),
             "segment": (S, 4),
             "motion": (S, m, 3),
             "shortest": (),
         }
 
-    def _body(self, width: int) -> Body:
+    def _body(self, width: int) -> BodyArrays:
         """Return the dimensions for blocks of ``width`` postures, all of the same arm."""
-        return Body(
+        return BodyArrays(
             *(frozen(np.repeat(x[None, ..., None], width, axis=-1)) for x in self.dimensions)
         )
 
     @property
     def size(self) -> int:
-        """Numbers in :class:`Pose` for one posture."""
+        """Numbers in :class:`PoseArrays` for one posture."""
         return sum(math.prod(shape) for shape in self.shapes.values())
 
 
 @lru_cache(maxsize=16)
-def rows_of(arm: Manipulator) -> ArmRows:
+def tables_of(arm: Manipulator) -> ArmTables:
     """Return the arrays of an arm, which are made once."""
-    return ArmRows(arm)
+    return ArmTables(arm)
 
 
 def side_by_side(values: Array, width: int) -> Array:
@@ -205,7 +247,7 @@ def _blocks(pulls: NDArray[np.bool_]) -> dict[str, Indices]:
     for c in np.argsort(pulls.sum(axis=1), kind="stable").tolist():
         added = np.flatnonzero(pulls[c] & ~before).tolist()
         if (before & ~pulls[c]).any() or not (axes or added):
-            return _found([], [])
+            return _block_arrays([], [])
         if added and (not axes or len(cables[-1]) >= len(axes[-1])):
             axes.append([])
             cables.append([])
@@ -213,21 +255,30 @@ def _blocks(pulls: NDArray[np.bool_]) -> dict[str, Indices]:
         cables[-1].append(c)
         before = pulls[c]
     solvable = all(len(a) <= min(2, len(c)) for a, c in zip(axes, cables, strict=True))
-    return _found(axes, cables) if before.all() and solvable else _found([], [])
+    return _block_arrays(axes, cables) if before.all() and solvable else _block_arrays([], [])
 
 
-def _found(axes: list[list[int]], cables: list[list[int]]) -> dict[str, Indices]:
+def _block_arrays(axes: list[list[int]], cables: list[list[int]]) -> dict[str, Indices]:
+    """Return axes, cables and pairs of the blocks as fields of :class:`ArmArrays`."""
     pairs = [
-        list(combinations(own, 2)) if len(of) > 1 else [(c, c) for c in own]
-        for of, own in zip(axes, cables, strict=True)
+        list(combinations(block, 2)) if len(turned) > 1 else [(c, c) for c in block]
+        for turned, block in zip(axes, cables, strict=True)
     ]
-    found: dict[str, Indices] = {}
-    for name, ends, parts in (
-        ("axes", "axis_ends", axes),
-        ("cables", "cable_ends", cables),
-        ("pairs", "pair_ends", pairs),
-    ):
-        flat = np.array([each for part in parts for each in part], dtype=np.intp)
-        found[name] = frozen(flat.reshape(-1, 2) if name == "pairs" else flat)
-        found[ends] = frozen(np.cumsum([0, *map(len, parts)]).astype(np.intp))
-    return found
+    return {
+        "axes": _flat(axes),
+        "axis_ends": _ends(axes),
+        "cables": _flat(cables),
+        "cable_ends": _ends(cables),
+        "pairs": frozen(_flat(pairs).reshape(-1, 2)),
+        "pair_ends": _ends(pairs),
+    }
+
+
+def _flat(blocks: Sequence[Sequence[Any]]) -> Indices:
+    entries = [entry for block in blocks for entry in block]
+    return frozen(np.array(entries, dtype=np.intp))
+
+
+def _ends(blocks: Sequence[Sequence[Any]]) -> Indices:
+    """Return where each block begins, and the last one ends."""
+    return frozen(np.cumsum([0, *map(len, blocks)]).astype(np.intp))

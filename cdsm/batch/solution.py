@@ -1,8 +1,4 @@
-"""Rows of a batch, computed in chunks by several threads, by compiled kernels or by numpy.
-
-The arguments are already checked. A row is a posture, possibly of a variant of the arm. What numpy
-computes is the source of the kernels, loaded without the compiler.
-"""
+"""Compute rows in chunks, by several threads, with kernels that numba compiles or numpy runs."""
 
 from __future__ import annotations
 
@@ -13,24 +9,19 @@ import os
 import platform
 import sys
 import threading
-from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 
-from cdsm.batch.chunk import Chunk
+from cdsm.batch.chunk import Chunk, Scratch
 from cdsm.batch.quantities import Codes, shapes_of
-from cdsm.batch.rows import ArmRows, Body, rows_of
-from cdsm.manipulator import Manipulator
+from cdsm.batch.rows import ArmTables, Rows, tables_of
 from cdsm.support.values import Array
-
-Springs = Callable[[Array, Array, slice], Array]
 
 # numbers of the poses of a chunk, compiled and by numpy, where a chunk has one block; 64 postures
 # side by side are fastest, or 32 of long arms
@@ -47,19 +38,29 @@ _lock = threading.Lock()
 _spent = 0.0
 
 
-def kernels_for(arm: ArmRows, count: int) -> ModuleType:
-    """Return the kernels for ``count`` more postures, compiled if they are or if it pays."""
+def choose_kernels(arm: ArmTables, count: int) -> ModuleType:
+    """Choose the kernels for ``count`` more rows: compiled ones if they are at hand or pay.
+
+    Compiling takes half a minute, once on a machine; numba keeps the result on disk. So compiled
+    kernels run
+
+    1. if this process has them already, or numba has kept them on disk, which
+       ``python -m cdsm.batch`` does ahead;
+    2. or if all rows that this process has computed and asked for, this time's included, would take
+       numpy longer than PATIENCE. Then they are compiled now, with a message in the log.
+
+    Else numpy runs the same source, some ten times slower. Both give the same numbers to rounding.
+    """
     global _spent
     with _lock:
         _spent += _SECONDS * arm.size * count
-        if _spent < PATIENCE and not (compiled.cache_info().currsize or _is_kept()):
-            return plain()
-        return compiled()
+        at_hand = compiled_kernels.cache_info().currsize > 0 or _is_kept()
+        return compiled_kernels() if at_hand or _spent >= PATIENCE else numpy_kernels()
 
 
 def compile_ahead() -> None:
     """Compile all kernels, unless numba has kept them on disk."""
-    from cdsm import kernels
+    from cdsm.batch import kernels
     from cdsm.presets import virtual_prototype
 
     arm = virtual_prototype()
@@ -73,14 +74,14 @@ def compile_ahead() -> None:
         directions=np.eye(3),
     )
     with np.errstate(all="ignore"):
-        Chunk(rows, kernels, slice(1), 1, np.zeros(1, np.uint8), {}).quantities()
+        Chunk(rows, kernels, slice(1), 1, Scratch()).quantities()
     _keep_record()
 
 
 @cache
-def compiled() -> ModuleType:
+def compiled_kernels() -> ModuleType:
     """Import the compiled kernels, and compile those that numba has not kept."""
-    from cdsm import kernels
+    from cdsm.batch import kernels
 
     if not _is_kept():
         _log.warning("compiling the kernels of batches, once on this machine: half a minute")
@@ -89,9 +90,9 @@ def compiled() -> ModuleType:
 
 
 @cache
-def plain() -> ModuleType:
-    """Load the kernels once more, without the compiler."""
-    name = "cdsm._plain_kernels"
+def numpy_kernels() -> ModuleType:
+    """Load the source of the kernels once more, without the compiler."""
+    name = "cdsm.batch._numpy_kernels"
     spec = importlib.util.spec_from_file_location(name, _source())
     assert spec is not None
     assert spec.loader is not None
@@ -129,7 +130,7 @@ def _record() -> Path | None:
     """
     folder = Path(os.environ.get("NUMBA_CACHE_DIR") or _source().parent / "__pycache__")
     if not folder.is_dir() and not os.access(folder.parent, os.W_OK):  # numba keeps it elsewhere
-        from cdsm import kernels
+        from cdsm.batch import kernels
 
         path: str | None = kernels.along.stats.cache_path  # type: ignore[attr-defined]
         if path is None:
@@ -146,68 +147,39 @@ def _stamp() -> str:
 
 
 def _source() -> Path:
-    return Path(__file__).parents[1] / "kernels.py"
+    return Path(__file__).with_name("kernels.py")
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Rows:
-    """Postures of an arm, loads, and what is given or asked of them.
+def solve_rows(rows: Rows, threads: int = 1) -> tuple[dict[str, Array], Codes]:
+    """Compute the quantities of all rows by name (N, …), and the status (N,) of each row."""
+    table = tables_of(rows.arm)
+    count = len(rows.q)
+    kernels = choose_kernels(table, count)
+    width = 32 if rows.arm.nv >= 80 else 64
+    size = min(max(1, _WIDE // table.size), 2048)
+    if kernels.COMPILED:
+        size = width * max(1, _CACHE // (table.size * width))
+    parts = [slice(first, first + size) for first in range(0, count, size)]
+    shapes = shapes_of(rows.arm.nv, len(rows.arm.cables), len(rows.directions))
+    values = {name: np.empty((count, *shapes[name])) for name in rows.names}
+    status = np.zeros(count, dtype=np.uint8)
+    of_thread = threading.local()
 
-    An array of loads, tensions or bounds has one row for all, or one for each posture.
+    def fill(part: slice) -> None:
+        """Compute one chunk; no other thread writes to its rows."""
+        scratch = of_thread.__dict__.setdefault("scratch", Scratch())
+        with np.errstate(all="ignore"):
+            chunk = Chunk(rows, kernels, part, width, scratch)
+            quantities = chunk.quantities()
+        status[part] = chunk.status
+        for name, value in quantities.items():
+            values[name][part] = value
 
-    Attributes:
-        arm: The arm.
-        q: Joint angles (N, nv).
-        wrench: W (N, 6).
-        names: The quantities to compute.
-        tension: Given F (N, C) [N], or None.
-        bounds: Lower and upper bounds of F to distribute, (N, C) each [N], or None.
-        directions: Unit vectors (D, 3) of ``along``.
-        body: Dimensions of each row, rows first; those of the arm by default.
-        springs: Stiffness (n, C) of cables of lengths L (n, C) under F (n, C) in a slice of rows;
-            −1 outside a law; those of the arm by default.
-        check_limits: Whether rows beyond the joint limits are skipped.
-    """
-
-    arm: Manipulator
-    q: Array
-    wrench: Array
-    names: Collection[str]
-    tension: Array | None = None
-    bounds: tuple[Array, Array] | None = None
-    directions: Array = field(default_factory=partial(np.zeros, (0, 3)))
-    body: Body | None = None
-    springs: Springs | None = None
-    check_limits: bool = True
-
-    def solve(self, status: Codes, threads: int = 1) -> dict[str, Array]:
-        """Compute the quantities by name (N, …); set the ``status`` (N,) of rows that are OK."""
-        arm = self.arm
-        table = rows_of(self.arm)
-        count = len(self.q)
-        kernels = kernels_for(table, count)
-        width = 32 if arm.nv >= 80 else 64
-        size = min(max(1, _WIDE // table.size), 2048)
-        if kernels.COMPILED:
-            size = width * max(1, _CACHE // (table.size * width))
-        parts = [slice(first, first + size) for first in range(0, count, size)]
-        shapes = shapes_of(arm.nv, len(arm.cables), len(self.directions))
-        values = {name: np.empty((count, *shapes[name])) for name in self.names}
-
-        scratch = threading.local()
-
-        def fill(part: slice) -> None:
-            memory = scratch.__dict__.setdefault("of", {})
-            with np.errstate(all="ignore"):
-                found = Chunk(self, kernels, part, width, status[part], memory).quantities()
-            for name in self.names:
-                values[name][part] = found[name]
-
-        if threads == 1 or len(parts) < 2:
-            for part in parts:
-                fill(part)
-            return values
-        with ThreadPoolExecutor(min(threads, len(parts))) as pool:
-            for _ in pool.map(fill, parts):  # an error cancels the chunks that have not begun
-                pass
-        return values
+    if threads == 1 or len(parts) < 2:
+        for part in parts:
+            fill(part)
+        return values, status
+    with ThreadPoolExecutor(min(threads, len(parts))) as pool:
+        for _ in pool.map(fill, parts):  # an error cancels the chunks that have not begun
+            pass
+    return values, status

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm.batch.rows import rows_of
+from cdsm.batch.rows import tables_of
 from cdsm.manipulator import Manipulator
 from cdsm.support.values import Array
 
@@ -21,7 +21,7 @@ def length_bounds(arm: Manipulator) -> tuple[Array, Array]:
     a cable cross the same joint, or a joint and its follower; else they may be too wide.
     """
     routing = arm.routing
-    table = rows_of(arm)
+    table = tables_of(arm)
     ends = np.array([arm.lower, arm.upper])
     low, high = np.sort(table.coupling.angles(ends) if table.coupling else ends, axis=0)
     paths = dict[tuple[int, ...], list[int]]()

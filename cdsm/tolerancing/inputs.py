@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from cdsm.batch.rows import Body, rows_of
+from cdsm.batch.rows import BodyArrays, tables_of
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.parameters import PARAMETERS
@@ -58,7 +58,7 @@ class Inputs:
 
     def __init__(self, arm: Manipulator) -> None:
         cables = arm.cables
-        table = rows_of(arm)
+        table = tables_of(arm)
         self._arm = (arm.name, _LARGEST * arm.length)
         self._nominal = table.dimensions
         self._sprung = arm.springs.sprung
@@ -103,7 +103,7 @@ class Inputs:
                     self._lacks[name] = str(error).removeprefix(f"{name}: ")
         self.labels |= self.rebuilt
 
-    def bodies(self, errors: Errors, count: int) -> Body:
+    def bodies(self, errors: Errors, count: int) -> BodyArrays:
         """Return the dimensions of ``count`` arms with ``errors``."""
         numbers = self._numbers[:, None]
         for source, each in self._maps.items():
@@ -114,7 +114,7 @@ class Inputs:
         springs = 1.0 / softness
         springs[:, self._sprung] *= 1.0 + errors.get("joint_stiffness", 0.0)
         shapes = zip((*parts, springs), self._nominal, strict=True)
-        body = Body(*(part.reshape(count, *x.shape) for part, x in shapes))
+        body = BodyArrays(*(part.reshape(count, *x.shape) for part, x in shapes))
         a = self._first  # within one body
         b = self._first + 1
         longer = np.linalg.norm(body.site[:, b] - body.site[:, a], axis=2)
@@ -199,9 +199,9 @@ _LACKS = {
 
 def _changes(arm: Manipulator, sites: Sequence[str]) -> Iterator[Change]:
     """Yield what each input changes of the numbers of :class:`Inputs`; ``sites`` are named."""
-    dimensions = rows_of(arm).dimensions
+    dimensions = tables_of(arm).dimensions
     sizes = np.cumsum([0, *(x.size for x in dimensions)]).tolist()
-    starts = dict(zip((*Body._fields[:-1], "softness"), sizes, strict=False))
+    starts = dict(zip((*BodyArrays._fields[:-1], "softness"), sizes, strict=False))
     one = np.ones(1)
     for p, name in enumerate(sites):
         for i, axis in enumerate("xyz"):

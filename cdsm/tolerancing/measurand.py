@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch.quantities import Codes
-from cdsm.batch.solution import Rows
+from cdsm.batch.rows import Rows
+from cdsm.batch.solution import solve_rows
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
@@ -101,7 +102,7 @@ class Measurand(ReadOnlyState):
         q = np.tile(K.posture.q, (count, 1))
         q[:, ~arm.slides] += errors.get("joint_angle", none)
         q[:, arm.slides] += errors.get("joint_position", none)
-        found = Rows(
+        rows = Rows(
             arm=arm,
             q=q,
             wrench=K.wrench[None],
@@ -110,9 +111,12 @@ class Measurand(ReadOnlyState):
             bounds=bounds,
             directions=u,
             body=self.inputs.bodies(errors, count),
-            springs=lambda L, F, part: self._springs(errors, L, F, part),
+            cable_stiffness=lambda L, F, part: self._springs(errors, L, F, part),
             check_limits=False,
-        ).solve(status, threads)[self.of]
+            status=status,
+        )
+        quantities, status = solve_rows(rows, threads)
+        found = quantities[self.of]
         if self.of == "tension":
             found = found if self.cable is None else found[:, [self.cable]]
             return found + self._of_rebuilt(errors), status

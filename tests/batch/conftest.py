@@ -12,6 +12,7 @@ from cdsm.batch import solution
 @pytest.fixture(params=["compiled", "numpy"])
 def kernels(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """Let all batches of a test use these kernels."""
-    chosen = solution.compiled() if request.param == "compiled" else solution.plain()
-    monkeypatch.setattr(solution, "kernels_for", lambda *_: chosen)
+    is_compiled = request.param == "compiled"
+    chosen = solution.compiled_kernels() if is_compiled else solution.numpy_kernels()
+    monkeypatch.setattr(solution, "choose_kernels", lambda *_: chosen)
     return chosen

@@ -129,8 +129,8 @@ def test_a_batch_counts_each_spring_once(outputs: tuple[str, ...]) -> None:
     q, F = np.random.default_rng(0).uniform(-0.1, 0.1, (3, arm.nv)), np.full(15, 60.0)
     u = "z" if "along" in outputs else None
     joint = cdsm.stiffness(arm.at(q[1]), F).joint
-    for compiled in (solution.plain, solution.compiled):
+    for compiled in (solution.numpy_kernels, solution.compiled_kernels):
         with pytest.MonkeyPatch.context() as patched:
-            patched.setattr(solution, "kernels_for", lambda *_, kernels=compiled: kernels())
+            patched.setattr(solution, "choose_kernels", lambda *_, kernels=compiled: kernels())
             batch = cdsm.evaluate(arm, q, F, outputs=outputs, direction=u)
         np.testing.assert_allclose(batch["joint"][1], joint, rtol=0.0, atol=1e-10 * joint.max())
