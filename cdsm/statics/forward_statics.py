@@ -15,6 +15,7 @@ from cdsm.statics.continuation import Model, follow
 from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, settled
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.stiffness_matrix import checked_tension
+from cdsm.support.format import place
 from cdsm.support.validation import NO_WRENCH, instance, one_of, scalar, vector, wrench_vector
 from cdsm.support.values import Array
 
@@ -140,13 +141,23 @@ def _require_held(arm: LockedArm, home: Posture) -> None:
     values, vectors = np.linalg.eigh((state.stiffness + state.stiffness.T) / 2.0)
     if values[0] > _HELD * abs(values).max():
         return
-    worst = int(abs(vectors[:, 0]).argmax())
+    motion = vectors[:, 0]
+    worst = int(abs(motion).argmax())
     name = home.arm.joint_names[worst]
-    k = home.arm.springs.matrix[worst, worst]
-    unit = home.arm.stiffness_unit(worst)
-    weak = f"the spring of {name}, {k:.4g} {unit}, is too weak for its weight"
-    said = f"{weak if k else f'nothing holds {name}'} where the cables do not pull"
-    remedy = "Give all such joints springs at once, which replace those they have: springs.JOINT = "
-    remedy += "5 in ARM.toml or by --set, or joint_stiffness of the geometry, or, in Python, by "
-    remedy += "with_springs(); or start= under load."
-    raise EquilibriumError(said, state.residual, 0.0, name, remedy)
+    spring = float(motion @ home.arm.springs.matrix @ motion)
+    where = "springs.JOINT = 5 in ARM.toml or by --set, or joint_stiffness of the geometry, or, in "
+    where += "Python, by with_springs()"
+    if home.arm.springs.matrix[worst, worst]:
+        angle = place(home.q[worst], home.arm.joint_units[worst])
+        unit = home.arm.stiffness_unit(worst)
+        problem = (
+            f"at the free angles of the springs, {angle} of {name}, the arm is unstable under its "
+            f"weight: it takes {spring - values[0]:.4g} {unit} from the {spring:.4g} {unit} of the "
+            "springs, and the arm falls away from there"
+        )
+        remedy = f"Give start=, angles near where it comes to rest; or stiffer springs: {where}."
+    else:
+        problem = f"nothing holds {name} where the cables do not pull"
+        remedy = "Give all such joints springs at once, which replace those they have: "
+        remedy += f"{where}; or start= under load."
+    raise EquilibriumError(problem, state.residual, 0.0, name, remedy)

@@ -124,6 +124,27 @@ FORCE = np.array([0.0, 0.1, -0.2])
 GIVEN = ({"tension": TENSION}, {"pull": [0.006, -0.02, -0.02]}, {"pull": [0.004, 0.001, 0.0]})
 
 
+def test_a_free_angle_that_is_unstable_under_the_weight_is_named() -> None:
+    """A rod that stands on its hinge: k (q − q_0) = m g l/2 sin q has a root on either side."""
+    k, weight = 2.0, 2.2
+    geometry = cdsm.Geometry.hinged(
+        joints=1, twist=0.0, link_length=0.1, base_length=0.02, disk_offset=0.01, hole_radius=0.01,
+        link_mass=weight / (9.81 * 0.05), joint_stiffness=k, rest_angle=-0.1, joint_limit=1.5,
+    )  # fmt: skip
+    arm = cdsm.Manipulator(geometry, LAW, gravity=(-9.81, 0.0, 0.0))
+    message = r"-5\.73° of joint1.* unstable under its weight.*2\.189 N m/rad from the 2 N m/rad"
+    with pytest.raises(cdsm.EquilibriumError, match=message) as caught:
+        cdsm.forward_statics(arm, tension=np.zeros(len(arm.cables)))
+    assert "start=" in str(caught.value)
+    assert "too weak" not in str(caught.value)
+    rest = cdsm.forward_statics(arm, tension=np.zeros(len(arm.cables)), start=[-1.0])
+    q = rest.pose.q[0]
+    assert q < -0.5
+    assert k * (q + 0.1) == pytest.approx(weight * math.sin(q), rel=1e-9)
+    assert rest.stiffness.joint[0, 0] == pytest.approx(k - weight * math.cos(q), rel=1e-9)
+    assert rest.stable
+
+
 @pytest.mark.parametrize("given", GIVEN, ids=("tension", "slack", "pull"))
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_weights_hang_on_an_arm_whose_motors_go_on(
