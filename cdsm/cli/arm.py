@@ -114,10 +114,10 @@ def _of_robot(
         if cables is not None or tip is not None:
             raise misuse("--cables, --tip", "are those of the CASPR model; leave them out.")
         usual = cdsm.presets.ELASTIC_STAGE
-        found = cdsm.read_caspr(source, elasticity=law or usual, check_inertia=check_inertia)
+        robot = cdsm.read_caspr(source, elasticity=law or usual, check_inertia=check_inertia)
         if law is None:  # after reading: the folder may hold no model
             raise misuse("--wire", "give it: the cables of CASPR do not stretch.")
-        return found
+        return robot
     if source.suffix.lower() == ".toml":
         raise misuse("--from", f"{source} is no robot; an ARM.toml can be copied.")
     if cables is None or tip is None:
@@ -172,25 +172,25 @@ def export(
     if out.suffix.lower() == ".urdf":  # it has no cables: any wire does
         if (angles, minimum, actuators) != (None, 0.0, "length"):
             raise misuse("--angles, --minimum, --actuators", "are those of a MuJoCo model (.xml).")
-        found = cdsm.Manipulator.read(arm, 1e5, changes=options.changes_of(changes))
-        write_text(out, found.urdf)
-        return answer(as_json, _facts(found, out), found, f"written: {out}")
+        robot = cdsm.Manipulator.read(arm, 1e5, changes=options.changes_of(changes))
+        write_text(out, robot.urdf)
+        return answer(as_json, _facts(robot, out), robot, f"written: {out}")
     from cdsm.interchange.mjcf import mujoco_model
     from cdsm.support.format import JointUnits, key
 
     pose = options.posture(arm, changes, angles)
-    found = pose.arm
-    model = mujoco_model(found, pose, cdsm.distribute_tension(pose, minimum), actuators)
+    robot = pose.arm
+    model = mujoco_model(robot, pose, cdsm.distribute_tension(pose, minimum), actuators)
     write_text(out, model.text)
-    unit = JointUnits(found.slides).joined("N m s/rad", "N s/m")
-    wires = dict(zip(found.cables.names, model.cable_damping.tolist(), strict=True))
-    head, told = header(pose, [minimum])
-    told |= {"stable": model.unstable is None, "time_step_s": model.time_step}
-    told |= {"cable_damping_N_s_per_m": wires, key("joint_damping", unit): model.joint_damping}
-    told |= {"actuators": model.actuators}
+    unit = JointUnits(robot.slides).joined("N m s/rad", "N s/m")
+    wires = dict(zip(robot.cables.names, model.cable_damping.tolist(), strict=True))
+    head, numbers = header(pose, [minimum])
+    numbers |= {"stable": model.unstable is None, "time_step_s": model.time_step}
+    numbers |= {"cable_damping_N_s_per_m": wires, key("joint_damping", unit): model.joint_damping}
+    numbers |= {"actuators": model.actuators}
     warnings = [] if model.unstable is None else [model.unstable]
     lines = "\n".join([*model.remarks, f"written: {out}"])
-    return answer(as_json, told | _facts(found, out), head, lines, warnings=warnings)
+    return answer(as_json, numbers | _facts(robot, out), head, lines, warnings=warnings)
 
 
 def view(

@@ -104,8 +104,10 @@ def identify_parameters(
     ranges = _ranges(free)
     for name in ranges:
         if name.partition("@")[0] in ("slack", "gain"):
-            said = "changes no weight test: positions of the tip show it (in Python, TipPosition)."
-            raise misuse("--free", f"{name} {said}")
+            problem = (
+                "changes no weight test: positions of the tip show it (in Python, TipPosition)."
+            )
+            raise misuse("--free", f"{name} {problem}")
     parameters = ArmParameters(described, tuple(ranges))
     units = {name: parameters.unit(name) for name in ranges}
     labels = {f"{name} [{unit}]" if unit else name: name for name, (unit, _) in units.items()}
@@ -127,23 +129,27 @@ def identify_parameters(
     for at, (low, high) in bounds.items():
         if not low < start[at] < high:  # of a friction of 0, no derivative shows what it does
             start[at] = (low + high) / 2.0
-    found = cdsm.identify(model_of, read, bounds, start=start)
-    write_picture(figure, found.plot)
-    return answer(as_json, found.to_dict(), found, warnings=found.warnings)
+    identification = cdsm.identify(model_of, read, bounds, start=start)
+    write_picture(figure, identification.plot)
+    return answer(
+        as_json, identification.to_dict(), identification, warnings=identification.warnings
+    )
 
 
 def _ranges(free: list[str]) -> dict[str, Bounds | None]:
     """Return the bounds of each parameter of --free, by name and in its unit; None: the usual."""
     ranges: dict[str, Bounds | None] = {}
-    for each in free:
-        name, equals, given = each.partition("=")
+    for entry in free:
+        name, equals, limits = entry.partition("=")
         if name in ranges:
             raise misuse("--free", f"{name} is given twice.")
         form = "NAME=LOW:HIGH, such as friction=0:0.5"
-        found = (
-            options.parse_numbers("--free", given.replace(":", ","), (2,), form) if equals else None
+        numbers = (
+            options.parse_numbers("--free", limits.replace(":", ","), (2,), form)
+            if equals
+            else None
         )
-        ranges[name] = (found[0], found[1]) if found else None
+        ranges[name] = (numbers[0], numbers[1]) if numbers else None
     return ranges
 
 
@@ -184,5 +190,5 @@ def reproduce(
     written.append(write_text(out / "reproduction.json", f"{text}\n"))
     rows = [(f"{row[0]}: {row[1]}", *row[2:6]) for row in paper.to_rows(results)]
     table = "\n".join(aligned([("quantity", *paper.HEADER[2:6]), *rows]))
-    said = f"all numbers, and what each is: {out / 'reproduction.md'}"
-    return answer(as_json, numbers, table, f"{said}\nwritten: {', '.join(map(str, written))}")
+    summary = f"all numbers, and what each is: {out / 'reproduction.md'}"
+    return answer(as_json, numbers, table, f"{summary}\nwritten: {', '.join(map(str, written))}")

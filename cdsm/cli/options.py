@@ -105,8 +105,8 @@ def read_arm(arm: Path, changes: Iterable[str] | None) -> cdsm.Manipulator:
 
 def posture(arm: Path, changes: Iterable[str] | None, angles: str | None) -> cdsm.Posture:
     """Read an arm and return its posture at --angles."""
-    found = read_arm(arm, changes)
-    return found.at(joint_coordinates(angles, found))
+    robot = read_arm(arm, changes)
+    return robot.at(joint_coordinates(angles, robot))
 
 
 def load_at_tip(arm: cdsm.Manipulator, load: str | None, mass: float | None = None) -> Array:
@@ -116,9 +116,9 @@ def load_at_tip(arm: cdsm.Manipulator, load: str | None, mass: float | None = No
     from cdsm.support.validation import number_array
 
     form = "FX,FY,FZ or FX,FY,FZ,MX,MY,MZ"
-    given = [0.0] * 6 if load is None else parse_numbers("--load", load, (3, 6), form)
+    components = [0.0] * 6 if load is None else parse_numbers("--load", load, (3, 6), form)
     wrench = np.zeros(6)
-    wrench[: len(given)] = number_array("--load", given, "force")
+    wrench[: len(components)] = number_array("--load", components, "force")
     if mass and not arm.gravity.any():
         raise misuse("--mass", "has no weight without gravity.")
     wrench[:3] += number_array("--mass", mass or 0.0, "mass") * arm.gravity
@@ -142,15 +142,15 @@ def joint_coordinates(text: str | None, arm: cdsm.Manipulator) -> Array:
     form = "an angle"
     if text is not None and "=" in text:
         named = by_joint("--angles", text, arm, "JOINT=DEG,...")
-        each = {
+        values_by_name = {
             name: parse_numbers("--angles", value, (1,), form)[0] for name, value in named.items()
         }
-        given = [each.get(name, 0.0) for name in names]
+        values = [values_by_name.get(name, 0.0) for name in names]
     else:
         form = f"one angle, one for each of {', '.join(names)}, or some by name: {names[-1]}=10"
-        given = parse_numbers("--angles", "0" if text is None else text, (1, arm.nv), form)
-    pairs = zip(names, given * arm.nv if len(given) == 1 else given, strict=True)
-    return joint_scales(arm) * [scalar(f"--angles of {name}", each) for name, each in pairs]
+        values = parse_numbers("--angles", "0" if text is None else text, (1, arm.nv), form)
+    pairs = zip(names, values * arm.nv if len(values) == 1 else values, strict=True)
+    return joint_scales(arm) * [scalar(f"--angles of {name}", value) for name, value in pairs]
 
 
 def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[str, str]:

@@ -66,7 +66,9 @@ def print_json(numbers: Json) -> None:
 
 
 def header(
-    of: cdsm.Manipulator | cdsm.Posture, minimum: Sequence[float] = (), friction: str = "ignored"
+    subject: cdsm.Manipulator | cdsm.Posture,
+    minimum: Sequence[float] = (),
+    friction: str = "ignored",
 ) -> tuple[str, Json]:
     """Return what a result assumes of its arm, or of its only posture, as text and for JSON.
 
@@ -76,24 +78,24 @@ def header(
     from cdsm.support.format import coordinates, place, without_rounding
     from cdsm.wires.catalogue import wires_text
 
-    arm = of.arm if isinstance(of, cdsm.Posture) else of
-    own = [cable.minimum for cable in arm.cables]
-    least = [(max(low, min(own)), max(low, *own)) for low in minimum]
+    arm = subject.arm if isinstance(subject, cdsm.Posture) else subject
+    bounds = [cable.minimum for cable in arm.cables]
+    least = [(max(low, min(bounds)), max(low, *bounds)) for low in minimum]
     shown = ", ".join(f"{a:g}" if a == b else f"{a:g} to {b:g}" for a, b in least)
     rough = friction if arm.has_friction else "none"
     x, y, z = arm.gravity.tolist()
     words = [f"wire {wires_text(arm.cables)}", f"gravity {x:g}, {y:g}, {z:g} m/s²"]
     words += [f"least tension {shown} N"] if minimum else []
     lines = [f"with {'; '.join(words)}; friction {rough}", str(arm)]
-    if isinstance(of, cdsm.Posture):
-        joints = ", ".join(map(place, without_rounding(of.q).tolist(), arm.joint_units))
-        lines.append(f"at {joints}; tip at {coordinates(1e3 * of.tip[:3, 3])} mm")
-    told = {"wire": wires_text(arm.cables), "gravity_m_per_s2": arm.gravity}
-    told |= {
+    if isinstance(subject, cdsm.Posture):
+        joints = ", ".join(map(place, without_rounding(subject.q).tolist(), arm.joint_units))
+        lines.append(f"at {joints}; tip at {coordinates(1e3 * subject.tip[:3, 3])} mm")
+    assumptions = {"wire": wires_text(arm.cables), "gravity_m_per_s2": arm.gravity}
+    assumptions |= {
         "least_tension_N": [low for low, _ in least],
         "friction": rough,
     }
-    return "\n".join(lines), {"computed_with": told}
+    return "\n".join(lines), {"computed_with": assumptions}
 
 
 def write(path: Path | None, fill: Callable[[Path], object]) -> None:
@@ -119,11 +121,11 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
     """
 
     @wraps(function)
-    def command(**given: Any) -> None:
+    def command(**arguments: Any) -> None:
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = _show
-                code = function(**given)
+                code = function(**arguments)
         except (KeyboardInterrupt, SystemError) as error:
             # Ctrl-C within a compiled kernel raises SystemError from KeyboardInterrupt
             if debug_wanted.get() or not isinstance(error.__cause__ or error, KeyboardInterrupt):
@@ -131,7 +133,7 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
             typer.echo("interrupted: no file is half-written; what was saved stays", err=True)
             code = INTERRUPTED
         except typer.BadParameter as error:
-            if not given["as_json"]:
+            if not arguments["as_json"]:
                 raise
             print_json({"error": "BadParameter", "message": error.format_message(), "data": {}})
             code = error.exit_code
@@ -142,7 +144,7 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
             message = _OF_PYTHON.sub("", str(error))
             if isinstance(error, MemoryError):
                 message = f"out of memory: compute less at once; a sweep can --store. {error}"
-            if given["as_json"]:
+            if arguments["as_json"]:
                 print_json({"error": kind, "message": message, "data": vars(error)})
             else:
                 typer.secho(f"error: {message}", fg="red", err=True)

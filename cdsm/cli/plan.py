@@ -256,4 +256,4 @@ def design(
     names = ", ".join(path.name for path in paths)
     written: Json = {"written": [str(path) for path in paths], "chosen": number}
     said = f"design {number} is written to {folder}: {names}"
-    return answer(as_json, found.to_dict() | written, found._text(number), said)
+    return answer(as_json, found.to_dict() | written, found.describe(number), said)

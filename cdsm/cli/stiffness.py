@@ -70,18 +70,18 @@ def show_stiffness(
         about = f"{arm}\n{head}\ncdsm {cdsm.__version__}"
         write(out, lambda file: write_text(file, report.to_html(about)))
         failed = () if report.passed else ("FAIL: the report says why.",)
-        told = numbers | report.to_dict() | uncertainty
-        return answer(as_json, told, head, report, *lines, *sure, warnings=failed)
+        output = numbers | report.to_dict() | uncertainty
+        return answer(as_json, output, head, report, *lines, *sure, warnings=failed)
     if rest and rest.at_limit:  # K knows no stops
-        told = numbers | rest.to_dict()
+        output = numbers | rest.to_dict()
         with contextlib.suppress(cdsm.SingularStiffness):
-            told["along_N_per_m"] = [rest.along(u) for u in "xyz"]
-        return answer(as_json, told, head, rest, *lines, warnings=rest.warnings)
+            output["along_N_per_m"] = [rest.along(u) for u in "xyz"]
+        return answer(as_json, output, head, rest, *lines, warnings=rest.warnings)
     stuck, sticking = _sticking(K.distribution, axes)
     parts = [head, rest or K.distribution, K, *lines, *stuck, *sure]
-    told = numbers | K.to_dict() | (rest.to_dict() if rest else {}) | sticking | uncertainty
+    output = numbers | K.to_dict() | (rest.to_dict() if rest else {}) | sticking | uncertainty
     warnings = K.warnings[:1] + (rest.warnings if rest else ())
-    return answer(as_json, told, *parts, warnings=warnings)
+    return answer(as_json, output, *parts, warnings=warnings)
 
 
 def _balanced(
@@ -98,8 +98,8 @@ def _balanced(
         pose = arm.at(options.joint_coordinates(angles, arm))
         return cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum, maximum, wrench)), None
     if None not in (tension, pull) or (angles, minimum, maximum) != (None, 0.0, math.inf):
-        said = "say what the motors do, and the posture follows: give one of them, without "
-        raise misuse("--tension, --pull", f"{said}--angles, --minimum and --maximum.")
+        remedy = "say what the motors do, and the posture follows: give one of them, without "
+        raise misuse("--tension, --pull", f"{remedy}--angles, --minimum and --maximum.")
     option, text = ("--tension", tension) if pull is None else ("--pull", pull)
     form = f"one for each cable: {', '.join(arm.cables.names)}"
     values = options.parse_numbers(option, text or "", (len(arm.cables),), form)
@@ -137,30 +137,36 @@ def _uncertainty(
     """Return the uncertainty along each axis in which the tip can move, as a table and for JSON."""
     from cdsm.support.format import aligned
 
-    found: dict[str, Uncertainty] = {}
+    budgets: dict[str, Uncertainty] = {}
     if tension is None or not tension.posture.arm.tolerances.given:
         return [], {}
     pose = tension.posture
     for name, u in axes.items():
         with contextlib.suppress(cdsm.SingularStiffness):
-            found[name] = cdsm.uncertainty(pose, tension, pose.arm.tolerances, direction=u)
-    if not found:
+            budgets[name] = cdsm.uncertainty(pose, tension, pose.arm.tolerances, direction=u)
+    if not budgets:
         return [], {}
 
     def percent(source: str) -> list[float]:
-        return [100.0 * each.contributions[source] / abs(each.value) for each in found.values()]
+        return [
+            100.0 * budget.contributions[source] / abs(budget.value) for budget in budgets.values()
+        ]
 
-    sources = {source for each in found.values() for source in each.contributions}
+    sources = {source for budget in budgets.values() for source in budget.contributions}
     rows = [
-        ("uncertainty [N/mm]", *found),
-        ("along", *(each.shown for each in found.values())),
+        ("uncertainty [N/mm]", *budgets),
+        ("along", *(budget.shown for budget in budgets.values())),
         *(
             (f"  {source.replace('_', ' ')}", *(f"{part:.2g} %" for part in percent(source)))
             for source in sorted(sources, key=lambda source: -max(percent(source)))
         ),
     ]
-    remarks = [f"along {name}: {each}" for name, of in found.items() for each in of.warnings]
-    numbers: Json = {name: each.to_dict() for name, each in found.items()}
+    remarks = [
+        f"along {name}: {warning}"
+        for name, budget in budgets.items()
+        for warning in budget.warnings
+    ]
+    numbers: Json = {name: budget.to_dict() for name, budget in budgets.items()}
     return ["\n".join([*aligned(rows), *remarks])], {"uncertainty": numbers}
 
 
@@ -213,9 +219,9 @@ def weigh(
         note = f"at the full load{without}:\n{result.states[-1]}"
     write_picture(figure, result.plot)
     warnings = (*K.warnings, *(rest.warnings if rest else ()), *result.warnings)
-    told = numbers | ({"rest": rest} if rest else {}) | result.to_dict() | more
+    output = numbers | ({"rest": rest} if rest else {}) | result.to_dict() | more
     parts = [head, *([rest, K] if rest else []), result, note]
-    return answer(as_json, told, *parts, warnings=dict.fromkeys(warnings))
+    return answer(as_json, output, *parts, warnings=dict.fromkeys(warnings))
 
 
 def _weight(arm: cdsm.Manipulator, load: str | None, mass: float | None) -> Array:
@@ -277,11 +283,11 @@ def buckle(
         raise misuse("--minimum, --maximum", "bound the tensions under --load or --mass: give one.")
     pose = options.posture(arm, changes, angles)
     tension = cdsm.critical_tension(pose)
-    found: dict[str, CriticalTension | CriticalLoad] = {"critical_tension": tension}
+    results: dict[str, CriticalTension | CriticalLoad] = {"critical_tension": tension}
     if loaded:
         wrench = _weight(pose.arm, load, mass)
-        found["critical_load"] = cdsm.critical_load(pose, wrench, minimum, maximum)
+        results["critical_load"] = cdsm.critical_load(pose, wrench, minimum, maximum)
     write_picture(figure, tension.plot)
     head, numbers = header(pose, [minimum] if loaded else [])
-    warnings = [warning for each in found.values() for warning in each.warnings]
-    return answer(as_json, numbers | found, head, *found.values(), warnings=warnings)
+    warnings = [warning for result in results.values() for warning in result.warnings]
+    return answer(as_json, numbers | results, head, *results.values(), warnings=warnings)

@@ -145,9 +145,9 @@ class DesignSearch(ReadOnlyState, Plotted):
         return f"<DesignSearch: {plural(len(self.front), 'design')} on the front>"
 
     def __str__(self) -> str:
-        return self._text(self.compromise)
+        return self.describe(self.compromise)
 
-    def _text(self, chosen: int) -> str:
+    def describe(self, chosen: int) -> str:
         """Return the printed table of the front; it includes design ``chosen``."""
         problem = self.problem
         feasible = int(self.evaluated.feasible.sum())
@@ -171,7 +171,7 @@ class DesignSearch(ReadOnlyState, Plotted):
         return sorted({*even.tolist(), self.compromise, *also})
 
     @property
-    def _labels(self) -> list[str]:
+    def objective_labels(self) -> list[str]:
         """Name and unit of each objective, for the axes of a figure."""
         labels = [(objective.words, objective.unit[0]) for objective in self.problem.objectives]
         return [f"{name} [{unit}]" if unit else name for name, unit in labels]

@@ -16,19 +16,19 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
+from cdsm.planning.path_plan import PathPlan
 from cdsm.plots import style
 from cdsm.plots.style import MM
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.files import as_path, write_file
-from cdsm.support.validation import number_array
+from cdsm.support.validation import instance, number_array
 from cdsm.support.values import Array, frozen
+from cdsm.tension import Tension
 
 if TYPE_CHECKING:
     from cdsm.control.plants import PlantState
-    from cdsm.planning.path_plan import PathPlan
-    from cdsm.posture import Posture
     from cdsm.statics.modes import Modes
-    from cdsm.stiffness_matrix import Stiffness
-    from cdsm.tension import Tension
 
 ELLIPSOID_GRID: Final = (13, 25)
 """Number of points of a drawn ellipsoid: from pole to pole, and around its axis."""
@@ -78,11 +78,11 @@ def plot_arm(
         InvalidInput: An argument has the wrong type, or belongs to another arm or posture.
         SingularStiffness: K_θ is singular, so the ellipsoid does not exist.
     """
-    style.expect("pose", pose, "Posture")
+    instance("pose", pose, Posture)
     figure, axes = picture()
     scale = shades = None
     if tension is not None:
-        style.expect("tension", tension, "Tension")
+        instance("tension", tension, Tension)
         if tension.posture.arm != pose.arm:
             raise InvalidInput("tension", "belongs to another arm than the posture.")
         scale = color_scale(tension.values)
@@ -90,10 +90,10 @@ def plot_arm(
     draw_arm(axes, pose, shades)
     title = pose.arm.name
     if stiffness is not None:
-        style.expect("stiffness", stiffness, "Stiffness")
+        instance("stiffness", stiffness, Stiffness)
         if not stiffness.posture.equals(pose):
-            said = "belongs to another posture or arm; compute it for this one."
-            raise InvalidInput("stiffness", said)
+            problem = "belongs to another posture or arm; compute it for this one."
+            raise InvalidInput("stiffness", problem)
         if not stiffness.is_stable:
             return finish(figure, f"UNSTABLE: {title}", scale)
         drawn = ellipsoid(stiffness.compliance[:3, :3], pose.tip[:3, 3], pose.arm.length)
@@ -123,17 +123,18 @@ def plot_path(
         InvalidInput: ``path`` has no postures of one arm, or ``animate`` does not end in ``.gif``.
         FileError: The animation cannot be written.
     """
-    poses: Sequence[Any] = [path]
+    poses: Sequence[Any]
     if isinstance(path, Sequence):
-        poses = [getattr(each, "pose", each) for each in path]
-    for pose in poses:
-        style.expect("path", pose, "Posture" if isinstance(path, Sequence) else "PathPlan")
-    if not isinstance(path, Sequence):
+        poses = [getattr(state, "pose", state) for state in path]
+        for pose in poses:
+            instance("path", pose, Posture)
+    else:
+        instance("path", path, PathPlan)
         poses = [K.posture for K in path.stiffness]
         tensions = path.tensions if tensions is None else tensions
     if not poses or any(pose.arm != poses[0].arm for pose in poses):
-        said = "give postures of one arm, or a plan that reaches its target at some samples."
-        raise InvalidInput("path", said)
+        problem = "give postures of one arm, or a plan that reaches its target at some samples."
+        raise InvalidInput("path", problem)
     figure, axes = picture()
     *ghosts, last = (poses[k] for k in _some(len(poses), _GHOSTS))
     for pose, shade in zip(ghosts, np.linspace(0.8, 0.5, len(ghosts)), strict=True):

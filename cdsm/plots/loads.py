@@ -78,8 +78,8 @@ def plot_critical_load(critical: CriticalLoad) -> Figure:
     figure, axes = _margins(critical, critical.factors, critical.margins)
     if math.isfinite(critical.factor):
         words = {"buckling": "buckles", "infeasible": "no balance", "elasticity": "end of a law"}
-        said = f"{words[critical.limit]} at {critical.factor:.4g}"
-        _mark(axes, critical.factor, critical.margins[-1], said, (-6, -12), "right")
+        label = f"{words[critical.limit]} at {critical.factor:.4g}"
+        _mark(axes, critical.factor, critical.margins[-1], label, (-6, -12), "right")
     load = style.direction_name(critical.load[:3])
     axes.set(xlabel="factor of the load", title=f"{critical.posture.arm.name}: load {load} N")
     return figure
@@ -134,16 +134,16 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
     error, stiffness, band, tension = axes[:, 0]
     t = run.time
     target = N_PER_MM * run.target
-    found = N_PER_MM * run.stiffness
+    achieved = N_PER_MM * run.stiffness
     error.plot(t, MM * run.tip_error)
     error.set(ylabel="tip error [mm]")
     for k, u in enumerate(run.directions):
         color, label = style.COLORS[k % 7], f"along {style.direction_name(u)}; dashed: wanted"
         stiffness.plot(t, target[:, k], "--", color=color, linewidth=0.9)
-        stiffness.plot(t, found[:, k], color=color, label=label)
+        stiffness.plot(t, achieved[:, k], color=color, label=label)
     stiffness.set(ylabel="frictionless\nstiffness [N/mm]")
-    if np.nanmin(found / target, initial=1.0) < _HALF:  # else no percent is seen
-        style.from_zero(stiffness, target, found)
+    if np.nanmin(achieved / target, initial=1.0) < _HALF:  # else no percent is seen
+        style.from_zero(stiffness, target, achieved)
     half = MM * run.band
     if np.isfinite(half).any():
         band.fill_between(t, -half, half, color=style.SKY, alpha=0.4, label="first-order band")

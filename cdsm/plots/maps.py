@@ -116,11 +116,11 @@ def plot_map(
     check_sweep(dataset)
     remedy = "tip_position and the quantity must be among outputs of the sweep."
     for name in ("tip_position", quantity):
-        one_of("quantity", name, [str(each) for each in dataset.data_vars], remedy)
+        one_of("quantity", name, [str(variable) for variable in dataset.data_vars], remedy)
     if statistic is not None:
         one_of("statistic", statistic, get_args(Statistic))
     maps = list(_maps(dataset, quantity, section))
-    every = np.concatenate([each.values for each in maps])
+    every = np.concatenate([tip_map.values for tip_map in maps])
     if not len(every):
         raise InvalidInput(
             "section" if section is not None else "dataset",
@@ -128,17 +128,17 @@ def plot_map(
         )
     if statistic is None and maps[0].slice:
         statistic = "median"
-    limits = [each.limits() for each in maps]
+    limits = [tip_map.limits() for tip_map in maps]
     shapes = [float(np.ptp(x) / np.ptp(y)) for x, y in limits]
     figure, grid, size = _panels(shapes)
     colors, extend = _colors(every)
     for axes in grid.ravel()[len(maps) :]:
         axes.set_axis_off()
-    for axes, each, (x, y), shape in zip(grid.ravel(), maps, limits, shapes, strict=False):
-        _draw(axes, each, colors, statistic)
+    for axes, tip_map, (x, y), shape in zip(grid.ravel(), maps, limits, shapes, strict=False):
+        _draw(axes, tip_map, colors, statistic)
         axes.set(xlim=x, ylim=y, aspect="equal")
         axes.locator_params("x", nbins=min(5, max(1, int(size * shape / _TICK))), min_n_ticks=1)
-        axes.set_title(textwrap.fill(each.title, round(_CHARACTERS * (size * shape + 0.5))))
+        axes.set_title(textwrap.fill(tip_map.title, round(_CHARACTERS * (size * shape + 0.5))))
     name = dataset[quantity].long_name.split(",")[0]
     title = f"{dataset.attrs['title']}, {dataset.attrs['poses']}"
     if np.isfinite(every).any():
@@ -199,8 +199,8 @@ def _maps(dataset: xarray.Dataset, quantity: str, section: Any) -> Iterator[Map]
     known = np.isfinite(points).all(axis=1)
     points = points[known]
     (x, code) = (
-        each.transpose(*cases, *poses).values.reshape(len(names), -1)[:, known]
-        for each in (value, status.broadcast_like(value))
+        array.transpose(*cases, *poses).values.reshape(len(names), -1)[:, known]
+        for array in (value, status.broadcast_like(value))
     )
     (buckled,) = (code for code, word in status_names(dataset).items() if word == "unstable")
     unstable = code == buckled
@@ -220,8 +220,8 @@ def _name(coordinate: xarray.DataArray) -> str:
     """Write a coordinate of a case: ``minimum 20 N``."""
     value = coordinate.item()
     unit = coordinate.attrs.get("units", "1")
-    said = value if isinstance(value, str) else f"{value:g}"
-    return f"{coordinate.name} {said}{'' if unit == '1' else f' {unit}'}"
+    text = value if isinstance(value, str) else f"{value:g}"
+    return f"{coordinate.name} {text}{'' if unit == '1' else f' {unit}'}"
 
 
 def _views(points: Array, section: Any, path: bool) -> Iterator[View]:
@@ -237,10 +237,10 @@ def _views(points: Array, section: Any, path: bool) -> Iterator[View]:
     flat = np.ptp(points, axis=0) <= _FLAT * extent.max()
     if section is not None:
         if not isinstance(section, (tuple, list)) or len(section) != 3:
-            said = f"{section!r} given; an axis, its place and the half thickness [m] needed."
-            raise InvalidInput("section", said)
+            problem = f"{section!r} given; an axis, its place and the half thickness [m] needed."
+            raise InvalidInput("section", problem)
         axis = "xyz".index(one_of("axis", section[0], tuple("xyz")))
-        yield slab(axis, *(MM * scalar("section", each) for each in section[1:]))
+        yield slab(axis, *(MM * scalar("section", number) for number in section[1:]))
     elif flat.any():
         axis = int(np.where(flat, extent, np.inf).argmin())
         off = extent[axis] > _FLAT * extent.max()  # from the base, which is at the origin

@@ -86,12 +86,12 @@ def plot_identification(fit: Identification) -> Figure:
     figure, (axes,) = style.panels(style.TWO_COLUMNS, 3.2, count)
     *left, right = axes
     panels = iter(left)
-    for own, unit, size in ((stiff, "N/mm", N_PER_MM), (tips, "mm", MM)):
-        if own:
+    for places, unit, size in ((stiff, "N/mm", N_PER_MM), (tips, "mm", MM)):
+        if places:
             panel = next(panels)
-            sigma = [size * rows[k].std for k in own]
-            measured = size * fit.measured[own]
-            predicted = size * fit.predicted[own]
+            sigma = [size * rows[k].std for k in places]
+            measured = size * fit.measured[places]
+            predicted = size * fit.predicted[places]
             ends = [np.append(measured, predicted).min(), np.append(measured, predicted).max()]
             panel.plot(ends, ends, color="0.6", linewidth=0.9)
             panel.errorbar(measured, predicted, xerr=sigma, fmt="o", color=style.BLUE)
@@ -191,17 +191,17 @@ def plot_monte_carlo(run: MonteCarlo) -> Figure:
 
 
 @style.styled
-def plot_designs(found: DesignSearch) -> Figure:
+def plot_designs(search: DesignSearch) -> Figure:
     """Plot two or three objectives of feasible designs, with the front and its compromise.
 
     If there is one objective, its best value is plotted against the number of designs.
     """
-    objectives = found.problem.objectives
-    scales = [each.unit[1] for each in objectives]
-    names = [textwrap.fill(label, _WIDEST) for label in found._labels]
+    objectives = search.problem.objectives
+    scales = [objective.unit[1] for objective in objectives]
+    names = [textwrap.fill(label, _WIDEST) for label in search.objective_labels]
     if len(objectives) == 1:
         figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.4)
-        goals = np.where(found.evaluated.feasible, found.evaluated.goals[:, 0], np.inf)
+        goals = np.where(search.evaluated.feasible, search.evaluated.goals[:, 0], np.inf)
         best = np.minimum.accumulate(goals)
         known = np.flatnonzero(np.isfinite(best))
         shown = objectives[0].sign * best[known] / scales[0]
@@ -209,8 +209,8 @@ def plot_designs(found: DesignSearch) -> Figure:
         style.whole_numbers(axes.xaxis)
         axes.set(xlabel="designs evaluated", ylabel=names[0])
         return figure
-    every = found.evaluated
-    feasible = np.setdiff1d(np.flatnonzero(every.feasible), found.front)
+    every = search.evaluated
+    feasible = np.setdiff1d(np.flatnonzero(every.feasible), search.front)
     others = range(1, len(objectives))
     figure, axes = style.panels(
         style.ONE_COLUMN if len(others) == 1 else style.TWO_COLUMNS, 2.9, len(others)
@@ -218,13 +218,13 @@ def plot_designs(found: DesignSearch) -> Figure:
     for panel, k in zip(axes.flat, others, strict=True):
         x, y = (every[objectives[n].key] / scales[n] for n in (0, k))
         panel.plot(x[feasible], y[feasible], ".", color="0.7", label="feasible")
-        panel.plot(x[found.front], y[found.front], ".-", linewidth=0.8, label="front")
-        chosen = found.front[found.compromise]
+        panel.plot(x[search.front], y[search.front], ".-", linewidth=0.8, label="front")
+        chosen = search.front[search.compromise]
         ring = {"color": style.VERMILLION, "markerfacecolor": "none", "markersize": 8}
         panel.plot(x[chosen], y[chosen], "o", label="compromise", **ring)
         panel.set(xlabel=names[0], ylabel=names[k])
     style.legend_below(figure, axes, 3)
-    return style.titled(figure, f"{len(every)} designs of {found.problem.arm.name}")
+    return style.titled(figure, f"{len(every)} designs of {search.problem.arm.name}")
 
 
 @style.styled

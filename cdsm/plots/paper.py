@@ -115,7 +115,7 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
         ]
         rows.append((f"{reading} [N/mm]", lines))
     end = N_PER_MM * (1.0 + np.array(stated)) * curve.pseudoinverse[:1]
-    times = ", ".join(f"+{each:g}" for each in stated)
+    times = ", ".join(f"+{change:g}" for change in stated)
     label = f"paper: {times} times the first computed value"
     rows[0][1].append((curve.tension[-1:, 1], end, {**_DOT, "label": label}))
     figure, grid = _multiples(result, 4.4, rows)
@@ -191,8 +191,8 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
             for i, color in enumerate(style.COLORS[:3]):
                 for one, look in ((original, _WIDE), (curve, {"ls": style.STYLES[i]})):
                     values = N_PER_MM * getattr(one, name)[:, i]
-                    given = _named(one, {"color": color, **look}, f"{'xyz'[i]}, ")
-                    axes.plot(one.tension[:, 1], values, **given)
+                    options = _named(one, {"color": color, **look}, f"{'xyz'[i]}, ")
+                    axes.plot(one.tension[:, 1], values, **options)
             axes.set_yscale("log")
             axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes.yaxis.set_major_formatter("{x:g}")

@@ -11,14 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from cdsm.errors import InvalidInput
+from cdsm.planning.range import StiffnessRange
 from cdsm.plots import style
 from cdsm.plots.style import N_PER_MM
+from cdsm.support.validation import instance
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     from cdsm.planning.path_plan import PathPlan
     from cdsm.planning.plan import StiffnessPlan
-    from cdsm.planning.range import StiffnessRange
     from cdsm.planning.sensitivity import Saturation
     from cdsm.stiffness_matrix import Shares
     from cdsm.tension import Tension
@@ -46,30 +47,30 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
         InvalidInput: A range is missing or of the wrong type, or the directions are not in one
             coordinate plane.
     """
-    every = [one for each in ranges.values() for one in each]
-    for one in every:
-        style.expect("ranges", one, "StiffnessRange")
+    every = [attainable for row in ranges.values() for attainable in row]
+    for attainable in every:
+        instance("ranges", attainable, StiffnessRange)
     if not every or not all(ranges.values()):
         raise InvalidInput("ranges", "is empty; give ranges of several directions by label.")
-    u = abs(np.array([one.direction for one in every])).max(axis=0)
+    u = abs(np.array([attainable.direction for attainable in every])).max(axis=0)
     if u.min() > _SAME:
         raise InvalidInput("ranges", "has directions that are in no plane of two base axes.")
     first, second = plane = sorted(np.argsort(u)[1:].tolist())
     figure = Figure(figsize=(style.ONE_COLUMN, 4.2))
     axes: Any = figure.add_subplot(projection="polar")
 
-    def around(found: Sequence[StiffnessRange], values: Sequence[float]) -> tuple[Array, Array]:
-        v = np.array([one.direction for one in found])
+    def around(row: Sequence[StiffnessRange], values: Sequence[float]) -> tuple[Array, Array]:
+        v = np.array([one.direction for one in row])
         half = np.mod(np.arctan2(v[:, second], v[:, first]), np.pi)
         turn = np.sort(half)
         radius = N_PER_MM * np.array(values)[np.argsort(half)]
         return np.append(turn, [*(turn + np.pi), turn[0]]), np.append(radius, [*radius, radius[0]])
 
     shades = colormaps[style.COLOR_MAP](np.linspace(0.0, 0.85, len(ranges)))
-    for k, (label, found) in enumerate(ranges.items()):
-        high = around(found, [one.high for one in found])
+    for k, (label, row) in enumerate(ranges.items()):
+        high = around(row, [one.high for one in row])
         axes.plot(*high, style.STYLES[k % 4], color=shades[k], label=f"stiffest, {label}")
-    low = around(found, [one.low for one in found])
+    low = around(row, [one.low for one in row])
     axes.fill(*low, color="0.85", label=f"below the attainable range, {label}")
     axes.plot(*low, color="0.4", linewidth=0.8)
     ends = [f"{sign}{'xyz'[axis]}" for sign in "+-" for axis in plane]
@@ -81,21 +82,21 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
 
 
 @style.styled
-def plot_saturation(found: Saturation) -> Figure:
+def plot_saturation(saturation: Saturation) -> Figure:
     """Plot the stiffness [N/mm] against the lower bound of all tensions [N]."""
     figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.6)
-    axes.plot(found.minimum, N_PER_MM * found.along, label="least tensions")
-    direction = style.direction_name(found.direction)
+    axes.plot(saturation.minimum, N_PER_MM * saturation.along, label="least tensions")
+    direction = style.direction_name(saturation.direction)
     axes.set(xlabel="lower bound of tension [N]", ylabel=f"stiffness along {direction} [N/mm]")
     axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])  # also a curve that hardly changes is seen
-    if np.isfinite(found.bound):
-        label = f"saturates at {found.bound:.4g} N"
-        axes.axvline(found.bound, color=style.VERMILLION, linestyle="--", label=label)
-    if found.minimum[0] < found.stiffest < found.minimum[-1]:
-        label = f"softer above {found.stiffest:.4g} N"
-        axes.axvline(found.stiffest, color=style.GREEN, linestyle="-.", label=label)
+    if np.isfinite(saturation.bound):
+        label = f"saturates at {saturation.bound:.4g} N"
+        axes.axvline(saturation.bound, color=style.VERMILLION, linestyle="--", label=label)
+    if saturation.minimum[0] < saturation.stiffest < saturation.minimum[-1]:
+        label = f"softer above {saturation.stiffest:.4g} N"
+        axes.axvline(saturation.stiffest, color=style.GREEN, linestyle="-.", label=label)
     axes.legend(loc="lower right")
-    return style.titled(figure, found.posture.arm.name)
+    return style.titled(figure, saturation.posture.arm.name)
 
 
 @style.styled
@@ -139,7 +140,7 @@ def plot_shares(shares: Shares) -> Figure:
     arm = shares.posture.arm
     rest = [*shares.others.values()]
     none = np.zeros(len(rest))
-    passive, active = (N_PER_MM * np.append(each, none) for each in (shares.passive, shares.active))
+    passive, active = (N_PER_MM * np.append(part, none) for part in (shares.passive, shares.active))
     others = N_PER_MM * np.append(0.0 * shares.active, rest)
     figure, axes = _by_name([*arm.cables.names, *shares.others], "contribution [N/mm]")
     # bars of one sign stand on each other, so that none hides another
@@ -162,12 +163,12 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None =
     misses = "" if plan.reached else f", missed by {100.0 * plan.misfit:.2g} %"
     if attainable is None:
         return _plot_tensions([(F, f"planned{misses}", "o")], f"{F.posture.arm.name}: plan")
-    style.expect("attainable", attainable, "StiffnessRange")
+    instance("attainable", attainable, StiffnessRange)
     same = F.posture.equals(attainable.posture) and plan.direction.shape == (3,)
     if not same or abs(plan.direction - attainable.direction).max() > _SAME:
         raise InvalidInput("attainable", "is not of the posture and the direction of the plan.")
-    said = f"planned: {N_PER_MM * float(plan.achieved):.4g} N/mm"
-    return plot_stiffness_range(attainable, [(F, said, "o")])
+    label = f"planned: {N_PER_MM * float(plan.achieved):.4g} N/mm"
+    return plot_stiffness_range(attainable, [(F, label, "o")])
 
 
 @style.styled

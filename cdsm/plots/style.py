@@ -84,15 +84,6 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
         return write_file(path, lambda aside: figure.savefig(aside, metadata=_DATELESS[suffix]))
 
 
-def expect(name: str, value: object, kind: str) -> None:
-    """Raise :class:`InvalidInput` unless ``value``, an argument called ``name``, is a ``kind``.
-
-    ``kind`` is the name of a class, which cannot be imported here: its module imports this package.
-    """
-    if kind not in (base.__name__ for base in type(value).__mro__):
-        raise InvalidInput(name, f"{value!r} given; a {kind} is needed.")
-
-
 def direction_name(u: Array) -> str:
     """Format a direction (3,) as text, with components below 1e-9 as zero."""
     return coordinates(np.round(u, 9), "z.3g")
@@ -114,7 +105,7 @@ def titled(figure: Figure, text: str) -> Figure:
 
 def from_zero(axes: Any, *values: Array) -> None:
     """Set the range of the y-axis of a panel: from zero to above the largest of all values."""
-    highest = max((float(np.nanmax(each, initial=0.0)) for each in values), default=0.0)
+    highest = max((float(np.nanmax(array, initial=0.0)) for array in values), default=0.0)
     axes.set_ylim(0.0, _ROOM * highest or 1.0)
 
 
@@ -125,26 +116,26 @@ def whole_numbers(axis: Any) -> None:
 
 def legend_below(figure: Figure, axes: Any, columns: int, **options: Any) -> None:
     """Draw one legend below all panels; a label that several of ``axes`` have appears once."""
-    found: dict[str, Any] = {}
+    entries: dict[str, Any] = {}
     for panel in np.ravel(axes):
-        found |= dict(zip(*panel.get_legend_handles_labels()[::-1], strict=True))
-    if found:
+        entries |= dict(zip(*panel.get_legend_handles_labels()[::-1], strict=True))
+    if entries:
         options |= {"loc": "outside lower center", "ncols": columns}
-        figure.legend(list(found.values()), list(found), **options)
+        figure.legend(list(entries.values()), list(entries), **options)
 
 
 def line_looks(names: Sequence[str]) -> list[dict[str, Any]]:
     """Return colour, style and label of a line for each name; above 24 names, a colour only."""
     if len(names) > _NAMED:
-        return [{"color": each} for each in colormaps[COLOR_MAP](np.linspace(0, 1, len(names)))]
+        return [{"color": color} for color in colormaps[COLOR_MAP](np.linspace(0, 1, len(names)))]
     color = COLORS * 4
-    style = [each for each in STYLES for _ in COLORS]
+    style = [line_style for line_style in STYLES for _ in COLORS]
     return [{"color": color[i], "ls": style[i], "label": name} for i, name in enumerate(names)]
 
 
 def cable_lines(axes: Any, x: Array, values: Array, names: Sequence[str], **line: Any) -> None:
     """Draw values (N, C) against x (N,), a line for each of C cables, with their names."""
-    for own, look in zip(values.T, line_looks(names), strict=True):
-        axes.plot(x, own, **look, **line)
+    for column, look in zip(values.T, line_looks(names), strict=True):
+        axes.plot(x, column, **look, **line)
     if len(names) <= _NAMED:
         axes.legend(**BESIDE, ncols=1 + (len(names) > _NAMED // 2))

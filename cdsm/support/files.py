@@ -94,9 +94,9 @@ def require_folder(path: Path) -> None:
     folder = path.resolve().parent
     if not folder.is_dir():
         raise FileError(path, f"the folder {path.parent} does not exist; create it.")
-    for each, mode in ((folder, os.W_OK | os.X_OK), (path, os.W_OK)):
-        if each.exists() and not os.access(each, mode):
-            raise FileError(path, f"you may not write to {each}; give another place.")
+    for place, mode in ((folder, os.W_OK | os.X_OK), (path, os.W_OK)):
+        if place.exists() and not os.access(place, mode):
+            raise FileError(path, f"you may not write to {place}; give another place.")
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

@@ -102,8 +102,8 @@ def place(value: float, unit: str) -> str:
 
 def beyond(joint: str, value: float, low: float, high: float, unit: str) -> str:
     """Return the text of an error: the ``value`` of a joint [rad or m] is not in [low, high]."""
-    said = f"{joint} = {place(value, unit)} is outside {place(low, unit)} to {place(high, unit)}"
-    return f"{said} ({value:.4g} {unit} of {low:.4g} to {high:.4g} {unit})"
+    problem = f"{joint} = {place(value, unit)} is outside {place(low, unit)} to {place(high, unit)}"
+    return f"{problem} ({value:.4g} {unit} of {low:.4g} to {high:.4g} {unit})"
 
 
 def key(name: str, unit: str) -> str:
@@ -124,11 +124,11 @@ class JointUnits(NamedTuple):
 
     def to_dict(self, names: Sequence[str], q: Array) -> dict[str, object]:
         """Return joint coordinates q (..., nv) for JSON by joint name: angles_rad and ways_m."""
-        found: dict[str, object] = {"angles_rad": {}}
+        numbers: dict[str, object] = {"angles_rad": {}}
         for i, (name, slides) in enumerate(zip(names, self.slides, strict=True)):
-            column = found.setdefault("ways_m" if slides else "angles_rad", {})
+            column = numbers.setdefault("ways_m" if slides else "angles_rad", {})
             column[name] = q[..., i].tolist()  # type: ignore[index]
-        return found
+        return numbers
 
     def of(self, unit: str) -> str:
         """Return the SI unit of a quantity, whose ``unit`` may depend on the joints."""

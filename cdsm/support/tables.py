@@ -121,7 +121,7 @@ class Columns:
         for at, (name, unit) in enumerate(map(name_and_unit, table.header)):
             if name in self:
                 self.refuse(f"has two columns called {name}; give each once")
-            as_long = [each for each in units if abs(len(each) - len(name)) < 2]
+            as_long = [column for column in units if abs(len(column) - len(name)) < 2]
             hint = did_you_mean(name, as_long, least=0.8)
             if name in units:
                 self._at[name], self.unit[name] = at, unit
@@ -140,7 +140,7 @@ class Columns:
         """Return the factor to SI of a column; refuse it if it is missing or has no known unit."""
         if (unit := self.unit.get(name, "")) not in self.units[name]:
             fault = f"the column {name} has no unit that is known"
-            names = " or ".join(f"{name} [{each}]" for each in self.units[name])
+            names = " or ".join(f"{name} [{unit}]" for unit in self.units[name])
             self.refuse(f"{fault if name in self else f'has no column {name}'}; call it {names}")
         return self.units[name][unit]
 
