@@ -25,7 +25,7 @@ from cdsm.errors import InvalidInput, listed, warn
 from cdsm.geometry import Geometry
 from cdsm.joints import Spring, Springs, springs_of
 from cdsm.posture import Posture
-from cdsm.rigid_body import RigidBody
+from cdsm.rigid_body import GRAVITY, RigidBody
 from cdsm.routing import SHORTEST_SEGMENT, Routing
 from cdsm.segments import Chains
 from cdsm.status import Status
@@ -55,9 +55,6 @@ if TYPE_CHECKING:
 
 CablesOrFile = Cable | Sequence[Cable] | str | os.PathLike[str]
 """One or more cables, or the path of their file."""
-
-GRAVITY = (0.0, 0.0, -9.81)
-"""Default gravity in base axes [m/s²]."""
 
 LIMIT_SLACK = 1e-9
 """Angle [rad] beyond a limit that is accepted as rounding, e.g. of a conversion from degrees."""

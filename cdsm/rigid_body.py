@@ -22,6 +22,9 @@ from cdsm.joints import coupling_of, limits_of, mimics_of
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, frozen
 
+GRAVITY = (0.0, 0.0, -9.81)
+"""Default gravity in base axes [m/s²]."""
+
 _ENDLESS = 1e300  # limit of a continuous joint in the text that Pinocchio reads
 
 

@@ -18,7 +18,7 @@ from pydantic import ValidationInfo as Info
 from cdsm.cable import Cable, Cables, Control, Site, serpentine_cables
 from cdsm.errors import LINES, FileError, GeometryError, listed, warn
 from cdsm.geometry import Geometry, toml
-from cdsm.manipulator import GRAVITY
+from cdsm.rigid_body import GRAVITY
 from cdsm.support import records
 from cdsm.support.files import read_text
 from cdsm.support.records import EACH, ONE, CrossFaults, laid_over, read_toml, record

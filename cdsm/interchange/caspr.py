@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike
 
 from cdsm.cable import Cable, Site
 from cdsm.errors import FileError, InvalidInput, unknown
-from cdsm.manipulator import GRAVITY, Manipulator
+from cdsm.manipulator import Manipulator
+from cdsm.rigid_body import GRAVITY
 from cdsm.support.files import XmlFault, as_path, parse_xml, read_numbers, read_text
 from cdsm.support.validation import AXES
 from cdsm.support.values import Array
