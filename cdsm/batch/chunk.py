@@ -105,7 +105,7 @@ class Chunk:
         shapes = table.shapes.items()
         arrays = (self._scratch.empty(name, len(q), *shape, self._width) for name, shape in shapes)
         at = PoseArrays(*arrays)
-        self._kernels.pose(table.arm, self._body(), q, W, at)
+        self._kernels.fill_pose(table.arm, self._body(), q, W, at)
         return at
 
     def _by_independent_joints(self, at: PoseArrays) -> PoseArrays:
@@ -149,7 +149,7 @@ class Chunk:
         F = np.empty(shape)
         optimal = np.zeros((shape[0], shape[2]), dtype=np.bool_)
         if len(self._table.arm.pairs):
-            self._kernels.guess(self._table.arm, at, low, high, F, optimal)
+            self._kernels.guess_tensions(self._table.arm, at, low, high, F, optimal)
         for n in np.flatnonzero(~self._one_by_one(optimal) & (self.status == Status.OK)):
             b, w = divmod(int(n), self._width)
             row = at.jacobian[b, ..., w], at.torque[b, :, w], low[b, :, w], high[b, :, w]
@@ -200,7 +200,7 @@ class Chunk:
         return values
 
     def _is_eliminated_in_place(self, wanted: set[str]) -> bool:
-        """Whether the kernel ``along`` has all that is wanted of K_θ."""
+        """Whether the kernel ``fill_along`` has all that is wanted of K_θ."""
         return (
             self._kernels.COMPILED
             and self._table.coupling is None
@@ -219,7 +219,7 @@ class Chunk:
             u = self._rows.directions.copy()  # writable, whatever u is: the kernel compiles once
             along = np.empty((len(F), len(u), self._width))
             moment = bool(W[:, 3:].any())
-            self._kernels.along(K, size, at.tip_jacobian, u, moment, UNMOVED, along, pivot)
+            self._kernels.fill_along(K, size, at.tip_jacobian, u, moment, UNMOVED, along, pivot)
             values["along"] = self._one_by_one(along)
         return values, self._one_by_one(pivot)
 
@@ -253,7 +253,7 @@ class Chunk:
         B, n, _ = at.gravity.shape
         K = self._scratch.empty(f"K{count}", B, count, n, n, self._width)
         size = self._scratch.empty("size", B, n, self._width)
-        self._kernels.stiffness(self._table.arm, body, at, F, k, W, K, size)
+        self._kernels.fill_stiffness(self._table.arm, body, at, F, k, W, K, size)
         return K, size
 
     def _read(

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,8 +43,10 @@ class Tensions(OfPostures):
     maximum: Array
     status: Codes
 
-    def _quantities(self) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
-        return self._of({"tension": self.values})
+    @property
+    def by_name(self) -> dict[str, Array]:
+        """The tensions (B, C) under their name, ``"tension"``."""
+        return {"tension": self.values}
 
 
 def distribute_tensions(
@@ -80,7 +81,7 @@ def distribute_tensions(
     instance("arm", arm, Manipulator)
     angles = postures(arm, q)
     low, high = checked_bounds(arm, minimum, maximum, len(angles))
-    loads = given_wrench(wrench, len(angles))
+    loads = check_wrench_rows(wrench, len(angles))
     rows = Rows(
         arm=arm,
         q=angles,
@@ -130,7 +131,7 @@ def per_row(name: str, value: ArrayLike, rows: int, width: int, meaning: str, ki
     return frozen(array)
 
 
-def given_tension(arm: Manipulator, value: ArrayLike, rows: int) -> Array:
+def check_tension_rows(arm: Manipulator, value: ArrayLike, rows: int) -> Array:
     """Check tensions (C,) or (rows, C) [N]; return them as a read-only array."""
     cables = [cable.name for cable in arm.cables]
     tension = per_row("tension", value, rows, len(cables), "one tension [N] per cable", "tension")
@@ -143,7 +144,7 @@ def given_tension(arm: Manipulator, value: ArrayLike, rows: int) -> Array:
     return tension
 
 
-def given_wrench(value: ArrayLike | None, rows: int) -> Array:
+def check_wrench_rows(value: ArrayLike | None, rows: int) -> Array:
     """Check a wrench (6,) or (rows, 6), zero if None; return it as a read-only array."""
     return per_row("wrench", np.zeros(6) if value is None else value, rows, 6, WRENCH, "wrench")
 

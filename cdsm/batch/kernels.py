@@ -201,7 +201,7 @@ def _hessian_row(u: Array, d: Array, z: Array, F: Array, sign: float, out: Array
 
 
 @kernel
-def pose(arm: ArmArrays, body: BodyArrays, q: Array, wrench: Array, at: PoseArrays) -> None:
+def fill_pose(arm: ArmArrays, body: BodyArrays, q: Array, wrench: Array, at: PoseArrays) -> None:
     """Fill ``at`` for joint angles q (B, n, W) and wrenches (B, 6, W)."""
     n = len(arm.parent)
     P = len(arm.frame)
@@ -297,7 +297,7 @@ def pose(arm: ArmArrays, body: BodyArrays, q: Array, wrench: Array, at: PoseArra
 
 
 @kernel
-def stiffness(
+def fill_stiffness(
     arm: ArmArrays,
     body: BodyArrays,
     at: PoseArrays,
@@ -403,7 +403,7 @@ def _accumulate_diagonal(K: Array, before: Array, size: Array) -> None:
 
 
 @kernel
-def along(
+def fill_along(
     K: Array,
     size: Array,
     JX: Array,
@@ -519,7 +519,7 @@ def _check_optimality(multiplier: Array, F: Array, high: Array, optimal: NDArray
 
 
 @kernel
-def guess(
+def guess_tensions(
     arm: ArmArrays,
     at: PoseArrays,
     low: Array,

@@ -61,12 +61,12 @@ class OfPostures(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """Return all quantities as a labelled Dataset in SI; needs xarray (CdsmError)."""
-        found = super().to_xarray()
-        found["status"].attrs = {
+        dataset = super().to_xarray()
+        dataset["status"].attrs = {
             "flag_values": np.array([int(status) for status in ENTRY_STATUSES], dtype=np.uint8),
             "flag_meanings": " ".join(status.word for status in ENTRY_STATUSES),
         }
-        return found
+        return dataset
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with a row for each posture; needs pandas (CdsmError)."""
@@ -80,11 +80,15 @@ class OfPostures(Result):
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.arm.name}, {summary(self.status)}>"
 
-    def _of(self, values: Mapping[str, Array]) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
-        """Yield name, value, unit and dimensions of ``values`` (B, …)."""
+    @property
+    def by_name(self) -> Mapping[str, Array]:
+        """The quantities by name, (B, …) each."""
+        raise NotImplementedError
+
+    def _quantities(self) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
         units = self._units()
         yield "q", self.q, units["joint"], ("pose", "joint")
-        for name, value in values.items():
+        for name, value in self.by_name.items():
             dims = QUANTITIES[name].dims
             unit = QUANTITIES[name].unit
             if name == "tip":

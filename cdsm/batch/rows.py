@@ -46,7 +46,7 @@ class ArmArrays(NamedTuple):
     tip_rotation: Array  # (3, 3)
     gravity: Array  # (3,) [m/s²]
     least: float  # moment arms below this are rounding [m]
-    axes: Indices  # joints of the K blocks of the kernel guess, from base to tip (n,)
+    axes: Indices  # joints of the K blocks of the kernel guess_tensions, from base to tip (n,)
     axis_ends: Indices  # where each block begins in axes, and the last ends (K+1,)
     cables: Indices  # cables of the blocks (C,)
     cable_ends: Indices  # the same in cables (K+1,)
@@ -67,7 +67,7 @@ class BodyArrays(NamedTuple):
 
 
 class PoseArrays(NamedTuple):
-    """What the kernel ``pose`` computes of B blocks of W postures."""
+    """What the kernel ``fill_pose`` computes of B blocks of W postures."""
 
     length: Array  # L (B, C, W) [m]
     jacobian: Array  # J_L (B, C, n, W)
@@ -236,7 +236,7 @@ def one_by_one(values: NDArray[_Scalar], count: int) -> NDArray[_Scalar]:
 
 
 def _blocks(pulls: NDArray[np.bool_]) -> dict[str, Indices]:
-    """Find the blocks of a serpentine arm for the kernel ``guess``; none if there are no such.
+    """Find the blocks of a serpentine arm for ``guess_tensions``; none if there are no such.
 
     Sorted by how many joints they turn, the cables of a block turn all joints of those before, and
     one or two more; a block has as many cables as axes, or more.

@@ -132,7 +132,7 @@ def _record() -> Path | None:
     if not folder.is_dir() and not os.access(folder.parent, os.W_OK):  # numba keeps it elsewhere
         from cdsm.batch import kernels
 
-        path: str | None = kernels.along.stats.cache_path  # type: ignore[attr-defined]
+        path: str | None = kernels.fill_along.stats.cache_path  # type: ignore[attr-defined]
         if path is None:
             return None
         folder = Path(path)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm
-from cdsm.statics.solve import FLAT, Balance, Point, settle
+from cdsm.statics.solve import NEUTRAL, Balance, Point, settle
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, quantity, unit
@@ -100,7 +100,7 @@ class Equilibrium(Result):
         its stop without a torque counts as free, even if this stop blocks the unstable motion.
         """
         values = self._motions[0]
-        return bool((values > 1e-2 * FLAT * abs(values).max(initial=0.0)).all())
+        return bool((values > 1e-2 * NEUTRAL * abs(values).max(initial=0.0)).all())
 
     @quantity("1")
     def neutral(self) -> bool:

@@ -25,7 +25,7 @@ from cdsm.posture import Posture
 from cdsm.support.values import Array, frozen
 
 BALANCED = 1e-9  # largest |r| of an equilibrium, over the sum of the magnitudes of its terms
-FLAT = 1e-10  # an eigenvalue of K whose size is below this part of the largest is rounding
+NEUTRAL = 1e-10  # an eigenvalue of K whose size is below this part of the largest is rounding
 FAR = 0.1  # largest motion of a joint [rad] from one equilibrium to the next while loads change
 
 _LONGEST = 0.2  # longest step of a joint [rad]
@@ -175,7 +175,7 @@ def _descend(
             break
         values = np.linalg.eigvalsh(K := _symmetric(f, here))
         # an eigenvalue that is rounding is 0
-        lowest = 0.0 if abs(values[0]) <= FLAT * abs(values).max() else float(values[0])
+        lowest = 0.0 if abs(values[0]) <= NEUTRAL * abs(values).max() else float(values[0])
         saddle = here.off <= BALANCED
         if saddle and (lowest >= 0.0 or kicks == 2):
             return _polished(f, here), True

@@ -226,7 +226,7 @@ class Stiffness(Result):
                 "Change the tensions or the posture.",
                 motion,
             )
-        return inverse
+        return frozen(inverse)
 
     def tip_response(self, u: Array, joints: Joints = slice(None)) -> tuple[float, Array]:
         """Compute the response to a tip force along a unit vector u (3,), other joints held.

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.batch.distribution import given_wrench
+from cdsm.batch.distribution import check_wrench_rows
 from cdsm.errors import CdsmError, FileError, InvalidInput, need
 from cdsm.manipulator import Manipulator
 from cdsm.status import Status
@@ -117,7 +117,7 @@ def sweep(
         checked_bounds(instance("arm", arm, Manipulator), low, maximum)
     loads, wrenches = _named(wrench)
     ways, directions = _named(direction)
-    W = given_wrench(wrenches, len(wrenches))
+    W = check_wrench_rows(wrenches, len(wrenches))
     u = unit_directions("direction", directions)
     cases = Labelled(
         arm=arm,
