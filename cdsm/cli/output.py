@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import warnings
 from collections.abc import Callable, Iterable, Sequence
@@ -69,30 +70,33 @@ def header(
     subject: cdsm.Manipulator | cdsm.Posture,
     minimum: Sequence[float] = (),
     friction: str = "ignored",
+    tension: cdsm.Tension | None = None,
 ) -> tuple[str, Json]:
     """Return what a result assumes of its arm, or of its only posture, as text and for JSON.
 
-    ``minimum`` is the bound that was given, one for each case; ``friction`` says what becomes of
-    the arm's friction.
+    ``minimum`` is the lower bound that was asked for, one for each case. What held of each cable is
+    that of ``tension``, or else the larger of it and the cable's own. ``friction`` says what
+    becomes of the arm's friction.
     """
-    from cdsm.support.format import coordinates, place, without_rounding
+    from cdsm.support.format import coordinates, place, span, without_rounding
+    from cdsm.tension import checked_bounds
     from cdsm.wires.catalogue import wires_text
 
     arm = subject.arm if isinstance(subject, cdsm.Posture) else subject
-    bounds = [cable.minimum for cable in arm.cables]
-    least = [(max(low, min(bounds)), max(low, *bounds)) for low in minimum]
-    shown = ", ".join(f"{a:g}" if a == b else f"{a:g} to {b:g}" for a, b in least)
+    held = [checked_bounds(arm, low, math.inf)[0] for low in minimum]
+    held = held if tension is None else [tension.minimum_held]
+    least = ", ".join(span(bounds, "{:g}".format) for bounds in held)
     rough = friction if arm.has_friction else "none"
     x, y, z = arm.gravity.tolist()
     words = [f"wire {wires_text(arm.cables)}", f"gravity {x:g}, {y:g}, {z:g} m/s²"]
-    words += [f"least tension {shown} N"] if minimum else []
+    words += [f"least tension {least} N"] if held else []
     lines = [f"with {'; '.join(words)}; friction {rough}", str(arm)]
     if isinstance(subject, cdsm.Posture):
         joints = ", ".join(map(place, without_rounding(subject.q).tolist(), arm.joint_units))
         lines.append(f"at {joints}; tip at {coordinates(1e3 * subject.tip[:3, 3])} mm")
     assumptions = {"wire": wires_text(arm.cables), "gravity_m_per_s2": arm.gravity}
     assumptions |= {
-        "least_tension_N": [low for low, _ in least],
+        "least_tension_N": [dict(zip(arm.cables.names, low, strict=True)) for low in held],
         "friction": rough,
     }
     return "\n".join(lines), {"computed_with": assumptions}

@@ -48,13 +48,21 @@ def plan(
             raise misuse("--target", "give it, or --path.")
         if max_change_per_sample < math.inf:
             raise misuse("--max-change-per-sample", "needs --path.")
+        from cdsm.planning.plan import checked_targets, plan_within
+        from cdsm.planning.range import range_within
+        from cdsm.planning.tension_space import TensionSpace
+        from cdsm.support.validation import unit_direction
+
         pose = options.posture(arm, changes, angles)
-        bounds = minimum, maximum, options.load_at_tip(pose.arm, load, mass)
-        attainable = cdsm.stiffness_range(pose, u, *bounds)
-        best = cdsm.plan_stiffness(pose, u, wanted, *bounds)
+        direction_of_tip = unit_direction("direction", u)
+        wrench = options.load_at_tip(pose.arm, load, mass)
+        stiffness_target = checked_targets(wanted, ())
+        space = TensionSpace(pose, direction_of_tip, minimum, maximum, wrench)
+        attainable = range_within(space)
+        best = plan_within(space, direction_of_tip, stiffness_target)
         write(out, best.write)
         write_picture(figure, lambda: best.plot(attainable))
-        head, numbers = header(pose, [minimum])
+        head, numbers = header(pose, [minimum], tension=best.tension)
         return answer(
             as_json, numbers | attainable.to_dict() | best.to_dict(), head, attainable, best
         )

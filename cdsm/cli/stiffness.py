@@ -56,7 +56,7 @@ def show_stiffness(
     robot = options.read_arm(arm, changes)
     wrench = options.load_at_tip(robot, load, mass)
     K, rest = _balanced(robot, wrench, angles, minimum, maximum, tension, pull)
-    head, numbers = header(K.posture, [] if rest else [minimum])
+    head, numbers = header(K.posture, [] if rest else [minimum], tension=K.distribution)
     axes = {axis: options.parse_direction(axis) for axis in ("x", "y", "z")}
     lines = list[str]()
     if direction is not None:

@@ -28,7 +28,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.validation import checked_quantity, scalar, whole_number
 from cdsm.support.values import Array
-from cdsm.tension import grip
+from cdsm.tension import friction_exponents
 from cdsm.terms import torque_of
 
 _LARGEST_NOISE: Final = 4.0  # standard deviations at which noise is cut off
@@ -193,7 +193,7 @@ class Observer:
         """
         segments = pose.segments
         F = tension[segments.chains.start[:-1]]
-        spread = np.hypot(max(self._tension_spread, _LEAST_SPREAD), grip(pose) * F)
+        spread = np.hypot(max(self._tension_spread, _LEAST_SPREAD), friction_exponents(pose) * F)
         weights = np.linalg.pinv(pose.length_jacobian.T * spread)
         torque = tension @ segments.length_jacobian + torque_of(pose.arm.terms, pose)
         found = np.linalg.lstsq(weights @ pose.jacobian[:3].T, weights @ torque, rcond=None)

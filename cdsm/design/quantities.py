@@ -18,7 +18,7 @@ from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.support.values import Array
 from cdsm.sweeps.cases import QUANTITIES, Cases
-from cdsm.tension import grip
+from cdsm.tension import friction_exponents
 
 _SWEPT: Final = {
     "stiffness": "translational_compliance",
@@ -109,7 +109,7 @@ class _Arm:
         if each.of == "motor_force":
             if not self.problem.worst_friction:
                 return found
-            return found * np.exp([grip(self._pair(n)[0]) for n in range(len(found))])
+            return found * np.exp([friction_exponents(self._pair(n)[0]) for n in range(len(found))])
         if each.of == "payload":
             found = found[:, self.ways.index(each.direction)]
         elif each.of == "stiffness":

@@ -124,7 +124,9 @@ def payload(
         pose, distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
     )
     C = K.compliance[:3, :3] if K.is_stable else np.zeros((3, 3))
-    low, high = bounds_at(pose, minimum, maximum, worst_friction)
+    bounds = bounds_at(pose, minimum, maximum, worst_friction)
+    low = bounds.minimum_held
+    high = bounds.maximum_held
 
     def limits(u: Array) -> dict[str, float]:
         yields = float(np.linalg.norm(C @ u))

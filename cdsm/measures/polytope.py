@@ -122,7 +122,9 @@ def force_polytope(
         CdsmError: A linear program fails.
     """
     instance("pose", pose, Posture)
-    low, high = bounds_at(pose, minimum, maximum, worst_friction)
+    bounds = bounds_at(pose, minimum, maximum, worst_friction)
+    low = bounds.minimum_held
+    high = bounds.maximum_held
     W = wrench_vector("wrench", wrench)
     if not np.isfinite(high).all():
         cable = pose.arm.cables[int(np.isinf(high).argmax())].name

@@ -97,9 +97,7 @@ class PathPlan(Result, Plotted):
 
         l_0 + Δl(F, l_0) = L, with :meth:`~cdsm.Cable.elongation` Δl.
         """
-        motors = self.arm.laws
-        pairs = zip(self.cable_lengths, self.tensions, strict=True)
-        rows = np.array([motors.original_lengths(L, F) for L, F in pairs])
+        rows = np.array([K.free_lengths for K in self.stiffness])
         return frozen(rows.reshape(self.tensions.shape)[:, self.arm.cables.position_controlled])
 
     @quantity("m", "planned", "axis")

@@ -81,7 +81,10 @@ class StiffnessPlan(Result):
 
     @quantity("m", "cable")
     def rest_lengths(self) -> Array:
-        """Lengths without strain (C,) [m] that the motors pay out; L if force-controlled."""
+        """Lengths without strain l_0 (C,) [m] that the motors pay out; L if force-controlled.
+
+        l_0 + Δl(F, l_0) = L, with :meth:`~cdsm.Cable.elongation` Δl.
+        """
         return self.stiffness.free_lengths
 
     def plot(self, attainable: StiffnessRange | None = None) -> Figure:
@@ -151,9 +154,16 @@ def plan_stiffness(
     directions = unit_directions("direction", direction)
     targets = checked_targets(target, directions.shape[:-1])
     space = TensionSpace(pose, directions, minimum, maximum, wrench)
-    goal = Goal(space, targets.reshape(-1), flag("at_least", at_least))
+    return plan_within(space, directions, targets, flag("at_least", at_least))
+
+
+def plan_within(
+    space: TensionSpace, directions: Array, targets: Array, at_least: bool = False
+) -> StiffnessPlan:
+    """Plan for ``targets`` () or (n,) [N/m] along ``directions`` (3,) or (n, 3) of ``space``."""
+    goal = Goal(space, targets.reshape(-1), at_least)
     tension = space.tension(goal.least())
-    K = stiffness(pose, tension)
+    K = stiffness(space.pose, tension)
     value = achieved(K, directions)
     return StiffnessPlan(
         tension=tension,

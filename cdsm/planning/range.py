@@ -140,17 +140,23 @@ def stiffness_range(
     """
     u = unit_direction("direction", direction)
     number = whole_number("starts", starts, 1, 1000)
-    space = TensionSpace(pose, u, minimum, maximum, wrench)
+    return range_within(TensionSpace(pose, u, minimum, maximum, wrench), number)
+
+
+def range_within(space: TensionSpace, starts: int = STARTS) -> StiffnessRange:
+    """Compute the range along the only direction of ``space``, as :func:`stiffness_range` does."""
+    u = space.directions[0]
     with progress_bar("searching the ends of the range"):
-        found = ends(space, number)
-    if any(end.open for end in found):
-        said = f"none given, and the stiffness along {coordinates(u)} still changes at "
-        raise InvalidInput("maximum", f"{said}{space.capped[1].max():.4g} N; give one.")
-    low, high = (space.tension(end.F) for end in found)
+        softest, stiffest = ends(space, starts)
+    if softest.open or stiffest.open:
+        problem = f"none given, and the stiffness along {coordinates(u)} still changes at "
+        raise InvalidInput("maximum", f"{problem}{space.capped[1].max():.4g} N; give one.")
+    low = space.tension(softest.F)
+    high = space.tension(stiffest.F)
     return StiffnessRange(
         direction=u,
-        low=stiffness(pose, low).along(u),
-        high=stiffness(pose, high).along(u),
+        low=stiffness(space.pose, low).along(u),
+        high=stiffness(space.pose, high).along(u),
         low_tension=low,
         high_tension=high,
         floor=space.floor,

@@ -20,13 +20,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize
 
-from cdsm.errors import ElasticityRangeError, InfeasibleTension, InvalidInput, SingularStiffness
+from cdsm.errors import ElasticityRangeError, InfeasibleTension, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.prints import verdict
-from cdsm.support.validation import SMALLEST, instance
+from cdsm.support.validation import SMALLEST, instance, wrench_vector
 from cdsm.support.values import Array, frozen
-from cdsm.tension import Tension, advice, distribute_tension, too_few_cables
+from cdsm.tension import (
+    Tension,
+    advice,
+    bounds_at,
+    distribute_tension,
+    least_tension,
+    too_few_cables,
+)
 from cdsm.tension.solvers import DEFAULT_SOLVER, Problem, nondimensional, solve, without_warnings
 from cdsm.terms import CABLE_TERMS, required_torque, total
 
@@ -76,7 +83,9 @@ class TensionSpace:
     ) -> None:
         self.pose = instance("pose", pose, Posture)
         self.directions = directions.reshape(-1, 3)
-        self.least, (low, high) = _least_tensions(pose, minimum, maximum, wrench)
+        self.least = _least_tension_within_laws(pose, minimum, maximum, wrench)
+        low = self.least.minimum_held
+        high = self.least.maximum_held
         self.unit = float(self.least.values.max()) or 1.0
         self.bounds = low, high
         self.capped = low, np.minimum(high, FAR * max(self.unit, float(low.max())))
@@ -285,29 +294,32 @@ def unstable(K: Stiffness, tried: str, bounds: Bounds | None = None) -> Singular
     return SingularStiffness(said, K.critical_direction)
 
 
-def _least_tensions(
+def _least_tension_within_laws(
     pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: ArrayLike
-) -> tuple[Tension, Bounds]:
-    """Distribute the least tensions within bounds and domains; return these bounds, too."""
-    least = distribute_tension(pose, minimum, maximum, wrench)
-    cables = pose.arm.cables
-    F = least.values  # the others do not use their elasticity
-    held = cables.position_controlled
-    first = np.where(held, [cable.elasticity.low for cable in cables], 0.0)
-    last = np.where(held, [cable.elasticity.high for cable in cables], np.inf)
-    low = np.maximum(least.minimum, first)
-    high = np.minimum(least.maximum, last)
-    outside = (low > F) | (high < F)
-    if not outside.any():
-        return least, (low, high)
-    with suppress(InfeasibleTension, InvalidInput):  # InvalidInput: a domain is beyond its bounds
-        inside = distribute_tension(pose, low, high, wrench)
-        return replace(inside, minimum=least.minimum, maximum=least.maximum), (low, high)
-    wider = advice(pose.arm, F, least.minimum, least.maximum, outside)
+) -> Tension:
+    """Distribute the least tensions within the bounds and the domains of the laws.
+
+    Raises InfeasibleTension if no tensions within the bounds balance the arm, ElasticityRangeError
+    if none of those that do are within the domains.
+    """
+    bounds = bounds_at(pose, minimum, maximum, within_laws=True)
+    load = wrench_vector("wrench", wrench)
+    if (bounds.minimum_held <= bounds.maximum_held).all():
+        with suppress(InfeasibleTension):
+            return least_tension(pose, bounds, load)
+    least = distribute_tension(pose, minimum, maximum, load)
+    F = least.values
+    outside = (bounds.minimum_held > F) | (bounds.maximum_held < F)
+    if not outside.any():  # but for rounding, they are at an end of a domain
+        return replace(least, **bounds._asdict())
+    wider = advice(pose.arm, F, least.minimum_held, least.maximum_held, outside)
     places = np.flatnonzero(outside).tolist()
-    said = (
+    cables = pose.arm.cables
+    raise ElasticityRangeError(
         f"outside the domain {cables[places[0]].elasticity._span} of the elasticity, and no "
         "tensions within it and the bounds balance the arm. Take another elasticity, change the "
-        f"posture or the load{wider and f', {wider}'}."
+        f"posture or the load{wider and f', {wider}'}.",
+        F[outside].tolist(),
+        places,
+        [cables[c].name for c in places],
     )
-    raise ElasticityRangeError(said, F[outside].tolist(), places, [cables[c].name for c in places])

@@ -48,8 +48,8 @@ def optimality(K: Stiffness) -> tuple[float | None, float | None]:
     tension = K.distribution
     if tension is None:
         return None, None
-    below = tension.minimum - F
-    above = F - tension.maximum
+    below = tension.minimum_held - F
+    above = F - tension.maximum_held
     size = float(F.max()) or 1.0
     violation = max(0.0, float(np.maximum(below, above).max())) / size
     if not tension.least:

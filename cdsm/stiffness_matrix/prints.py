@@ -180,9 +180,9 @@ def find_remedies(K: Stiffness) -> Iterator[Remedy]:
         yield Remedy("wire", _factor(stiffer, _STIFFER))
     if pose.arm.laws.series[cables.position_controlled].any():
         yield Remedy("spring", _factor(lambda s: stiffer(spring=s), _STIFFER))
-    if given is not None and given.least and given.minimum.any():
-        low = given.minimum
-        high = given.maximum
+    if given is not None and given.least and given.minimum_held.any():
+        low = given.minimum_held
+        high = given.maximum_held
         solver = given.solver
 
         def tension(s: float) -> float:

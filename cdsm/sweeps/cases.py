@@ -25,7 +25,7 @@ from cdsm.quantities import names_of
 from cdsm.status import Status
 from cdsm.support.validation import checked_quantity, flag
 from cdsm.support.values import Array
-from cdsm.tension import checked_bounds, grip
+from cdsm.tension import checked_bounds, friction_exponents
 
 Needs = Literal["posture", "tension", "stiffness", "stable arm"]
 
@@ -227,7 +227,7 @@ class Cases:
         if self.worst_friction:
             loss = np.ones((len(q), low.shape[1]))
             for i in np.flatnonzero(evaluate(self.arm, q, outputs=[], threads=1).ok):
-                loss[i] = np.exp(grip(self.arm.at(q[i])))
+                loss[i] = np.exp(friction_exponents(self.arm.at(q[i])))
             loss = np.repeat(loss, self.count, axis=0)
             exist = np.asarray((low * loss <= high / loss).all(axis=1))
             loss[~exist] = 1.0

@@ -1,9 +1,9 @@
-"""Tension distribution: the smallest cable tensions that balance the arm, and their bounds."""
+"""Tension distribution: the smallest cable tensions that balance the arm."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, final
 
@@ -11,21 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
 from cdsm.errors import InvalidInput, solver_failed
-from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.status import Status
-from cdsm.support import validation
 from cdsm.support.format import aligned
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import (
-    NO_WRENCH,
-    bound,
-    flag,
-    instance,
-    one_of,
-    wrench_vector,
-)
+from cdsm.support.validation import NO_WRENCH, instance, one_of, wrench_vector
 from cdsm.support.values import Array, IndexedByName, frozen
+from cdsm.tension.bounds import Bounds, bounds_at
 from cdsm.tension.infeasibility import infeasible
 from cdsm.tension.least_tensions import least_tensions
 from cdsm.tension.solvers import DEFAULT_SOLVER, OPTIMALITY, nondimensional
@@ -47,8 +39,11 @@ class Tension(Result, IndexedByName):
         posture: The posture.
         values: F (C,) [N], in the order of ``posture.arm.cables``.
         wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
-        minimum: Lower bounds (C,) [N].
-        maximum: Upper bounds (C,) [N].
+        minimum: Lower bounds (C,) [N] that were asked for.
+        maximum: Upper bounds (C,) [N] that were asked for; inf for none.
+        minimum_held: Lower bounds (C,) [N] that held: narrowed by the cables' own, by
+            ``worst_friction``, by ``fixed`` and, in plans, by the laws.
+        maximum_held: Upper bounds (C,) [N] that held; inf for none.
         solver: Name of the solver that computed them.
         least: Whether they are the smallest tensions within the bounds; False if they were planned
             for a stiffness.
@@ -62,6 +57,8 @@ class Tension(Result, IndexedByName):
     wrench: Array = field(metadata=unit("N and N m", "component"))
     minimum: Array = field(metadata=unit("N", "cable"))
     maximum: Array = field(metadata=unit("N", "cable"))
+    minimum_held: Array = field(metadata=unit("N", "cable"))
+    maximum_held: Array = field(metadata=unit("N", "cable"))
     solver: str = field(metadata=unit("1"))
     least: bool = True
 
@@ -88,13 +85,13 @@ class Tension(Result, IndexedByName):
 
     @property
     def at_minimum(self) -> tuple[str, ...]:
-        """Names of the cables at their lower bound."""
-        return self._names(self.values - self.minimum)
+        """Names of the cables at the lower bound that held."""
+        return self._names(self.values - self.minimum_held)
 
     @property
     def at_maximum(self) -> tuple[str, ...]:
-        """Names of the cables at their upper bound."""
-        return self._names(self.maximum - self.values)
+        """Names of the cables at the upper bound that held."""
+        return self._names(self.maximum_held - self.values)
 
     def _names(self, distance: Array) -> tuple[str, ...]:
         tight = distance <= OPTIMALITY * self.values.max(initial=0.0)
@@ -142,75 +139,35 @@ def distribute_tension(
             missing torque, and how far the bounds of cables without a fixed tension must widen.
         CdsmError: The solver's solution does not meet the optimality conditions.
     """
-    cables = instance("pose", pose, Posture).arm.cables
-    low, high = bounds_at(pose, minimum, maximum, worst_friction)
-    if not isinstance(fixed := {} if fixed is None else fixed, Mapping):
+    instance("pose", pose, Posture)
+    tensions = {} if fixed is None else fixed
+    if not isinstance(tensions, Mapping):
         raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
-    for name, value in fixed.items():
-        c = cables.names.index(one_of("cable", name, cables.names))
-        held = validation.checked_quantity(f"fixed[{name!r}]", value, "tension", zero=True)
-        low, high = (frozen(np.r_[each[:c], held, each[c + 1 :]]) for each in (low, high))
-    wrench = wrench_vector("wrench", wrench)
+    bounds = bounds_at(pose, minimum, maximum, worst_friction, fixed=tensions)
+    load = wrench_vector("wrench", wrench)
+    return least_tension(pose, bounds, load, solver, tuple(tensions))
+
+
+def least_tension(
+    pose: Posture,
+    bounds: Bounds,
+    wrench: Array,
+    solver: str = DEFAULT_SOLVER,
+    fixed: Collection[str] = (),
+) -> Tension:
+    """Compute the least tensions in balance within ``bounds``, as :func:`distribute_tension` does.
+
+    ``fixed`` names the cables whose bounds are a fixed tension.
+    """
     torque = required_torque(pose, wrench)
+    low = bounds.minimum_held
+    high = bounds.maximum_held
     problem = nondimensional(pose.length_jacobian, torque, low, high, pose.arm.length)
     solution = least_tensions(problem, solver)
     if solution.status is Status.INFEASIBLE:
-        raise infeasible(pose, problem, np.array([name not in fixed for name in cables.names]))
+        free = np.array([name not in fixed for name in pose.arm.cables.names])
+        raise infeasible(pose, problem, free)
     if not solution.ok:
         raise solver_failed(solver, solution.message)
     F = frozen(solution.x * problem.force)
-    return Tension(posture=pose, values=F, wrench=wrench, minimum=low, maximum=high, solver=solver)
-
-
-def checked_bounds(
-    arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, rows: int | None = None
-) -> tuple[Array, Array]:
-    """Check both bounds, (C,) [N] each, and narrow them to those that the cables define.
-
-    With ``rows``, a bound may also have the shape (rows, C). Invalid bounds raise InvalidInput.
-    """
-    count = len(arm.cables)
-    own = "the cable's own "
-    low = bound("minimum", minimum, count, rows)
-    high = bound("maximum", maximum, count, rows)
-    least, most = arm.laws.narrowed(low, high)
-    allowed = (low >= 0.0) & (low < math.inf) & (least <= most)
-    if allowed.all():
-        return least, most
-    at = tuple(np.argwhere(~allowed)[0].tolist())
-    given, floor, ceiling, limit = (
-        float(np.broadcast_to(each, allowed.shape)[at]) for each in (low, least, most, high)
-    )
-    cable = arm.cables[at[-1]].name + (f" in row {at[0]}" if len(at) > 1 else "")
-    if not 0.0 <= given < math.inf:
-        only = "cables only pull, so it must be finite and not negative"
-        raise InvalidInput("minimum", f"{given:g} N given for {cable}; {only}.")
-    said = f"{ceiling:g} N ({own * (ceiling < limit)}maximum) for {cable} is below {floor:g} N"
-    said += f" ({own * (floor > given)}minimum); raise the one or lower the other."
-    raise InvalidInput("maximum", said)
-
-
-def bounds_at(
-    pose: Posture, minimum: ArrayLike, maximum: ArrayLike, worst_friction: bool
-) -> tuple[Array, Array]:
-    """Check the bounds, (C,) [N] each, and narrow them as :func:`distribute_tension` does."""
-    low, high = checked_bounds(pose.arm, minimum, maximum)
-    if not flag("worst_friction", worst_friction):
-        return low, high
-    loss = np.exp(grip(pose))
-    low = frozen(low * loss)
-    high = frozen(high / loss)
-    c = int(np.argmax(low - high))
-    if low[c] > high[c]:
-        said = f"would need {low[c]:.4g} N or more and {high[c]:.4g} N or less at its motor"
-        remedy = f"{said}; raise maximum or lower minimum."
-        raise InvalidInput("worst_friction", f"{pose.arm.cables[c].name} {remedy}")
-    return low, high
-
-
-def grip(pose: Posture) -> Array:
-    """Compute Σ μ φ (C,) [-] over the holes of each cable, with the friction μ and wrap angle φ."""
-    chains = pose.segments.chains
-    friction = pose.segments.grip
-    total = np.bincount(chains.cable[chains.hole], friction, len(pose.arm.cables))
-    return np.asarray(total, dtype=np.float64)
+    return Tension(posture=pose, values=F, wrench=wrench, solver=solver, **bounds._asdict())

@@ -95,7 +95,8 @@ class Measurand(ReadOnlyState):
         F = K.tension + errors.get("tension", none)
         if self.redistribute:
             assert K.distribution is not None
-            bounds = K.distribution.minimum[None], K.distribution.maximum[None]
+            held = K.distribution.minimum_held, K.distribution.maximum_held
+            bounds = held[0][None], held[1][None]
         elif self.of != "tip":  # cables only pull
             status[F.min(axis=1) < 0.0] = Status.OUTSIDE_ELASTICITY
         u = np.zeros((0, 3)) if self.direction is None else self.direction[None]

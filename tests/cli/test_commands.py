@@ -89,7 +89,7 @@ def test_stiffness(probe: Path, pose: cdsm.Posture, tmp_path: Path) -> None:
     K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 30.0, 400.0, wrench))
     assert_holds(found, K)
     assert found["along_direction_N_per_m"] == K.along((1, 0, -1))
-    assert found["computed_with"]["least_tension_N"] == [30.0]
+    assert found["computed_with"]["least_tension_N"] == [dict.fromkeys(pose.arm.cables.names, 30.0)]
     page = tmp_path / "report.html"
     report = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 30.0, 400.0)).report()
     assert_holds(told("stiffness", probe, *bounds, "--check", "--out", page), report)
@@ -370,3 +370,16 @@ def test_reproduce_writes_figures_table_and_numbers(tmp_path: Path) -> None:
     assert set(written) == figures | {"reproduction.json", "reproduction.md"}
     assert "Fig. 6: increment of stiffness" in result.output
     json.loads(written["reproduction.json"].read_text(encoding="utf-8"))
+
+
+def test_answers_say_which_least_tension_held(tmp_path: Path) -> None:
+    """The arm's own minimum of 10 N, although 0 N was asked for."""
+    arm = tmp_path / "ARM.toml"
+    assert call("new", arm, "--joints", 3).exit_code == 0
+    names = cdsm.Manipulator.read(arm).cables.names
+    held = [dict.fromkeys(names, 10.0)]
+    for command in ("stiffness", "plan --direction z --target 4"):
+        words = [*command.split(), "--angles", 10, "--minimum", 0]
+        answer = told(words[0], arm, *words[1:])
+        assert answer["computed_with"]["least_tension_N"] == held
+        assert "least tension 10 N" in call(words[0], arm, *words[1:]).stdout

@@ -4,6 +4,7 @@ import math
 import re
 import warnings
 from concurrent import futures
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,21 @@ def test_closed_form_of_a_hinge() -> None:
             expected[int(pulls.argmax())] = 14.0
             np.testing.assert_allclose(fixed.values, expected, rtol=1e-12)
             assert fixed[held] == 14.0
+
+
+# --- bounds ---------------------------------------------------------------------------------
+
+
+def test_what_was_asked_and_what_held_are_two_numbers() -> None:
+    cables = [replace(ARM.cables[0], minimum=20.0, maximum=400.0), *ARM.cables[1:]]
+    pose = ARM.with_cables(cables).at(POSE.q)
+    fixed = {ARM.cables.names[1]: 60.0}
+    pull = cdsm.distribute_tension(pose, 5.0, 500.0, fixed=fixed)
+    np.testing.assert_array_equal(pull.minimum, 5.0)
+    np.testing.assert_array_equal(pull.maximum, 500.0)
+    assert pull.minimum_held[:3].tolist() == [20.0, 60.0, 5.0]
+    assert pull.maximum_held[:3].tolist() == [400.0, 60.0, 500.0]
+    assert set(pull.at_minimum) == {name for name in pull if pull[name] in (5.0, 20.0, 60.0)}
 
 
 # --- what cannot be balanced ----------------------------------------------------------------

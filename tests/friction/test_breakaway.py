@@ -119,9 +119,9 @@ def test_worst_friction_narrows_the_bounds() -> None:
     pull = cdsm.distribute_tension(pose, 50.0, 400.0, worst_friction=True)
     chains = pose.segments.chains
     grip = np.bincount(chains.cable[chains.hole], pose.segments.grip)
-    np.testing.assert_allclose(pull.minimum, 50.0 * np.exp(grip), rtol=1e-14)
-    np.testing.assert_allclose(pull.maximum, 400.0 / np.exp(grip), rtol=1e-14)
-    assert (pull.values >= pull.minimum * (1.0 - 1e-9)).all()
+    np.testing.assert_allclose(pull.minimum_held, 50.0 * np.exp(grip), rtol=1e-14)
+    np.testing.assert_allclose(pull.maximum_held, 400.0 / np.exp(grip), rtol=1e-14)
+    assert (pull.values >= pull.minimum_held * (1.0 - 1e-9)).all()
     with pytest.raises(cdsm.InvalidInput, match=r"worst_friction: .* raise maximum"):
         cdsm.distribute_tension(pose, 50.0, 51.0, worst_friction=True)
     smooth, _ = prototype(0.0)

@@ -227,15 +227,15 @@ def check_least(pull: cdsm.Tension) -> None:
     """
     pose, F = pull.posture, pull.values
     J = pose.length_jacobian
-    assert (pull.minimum <= F).all()
-    assert (pull.maximum >= F).all()
+    assert (pull.minimum_held <= F).all()
+    assert (pull.maximum_held >= F).all()
     lever = float(abs(J).max())
     if lever <= 1e-14 * reach(pose.arm):
         return
     torque = pose.jacobian.T @ pull.wrench - pose.gravity_torque
     size = max(float(abs(F).max()), float(abs(torque).max()) / lever, 1e-300)
     assert float(abs(F @ J - torque).max()) <= 1e-8 * lever * size
-    low, high = F - pull.minimum <= 1e-9 * size, pull.maximum - F <= 1e-9 * size
+    low, high = F - pull.minimum_held <= 1e-9 * size, pull.maximum_held - F <= 1e-9 * size
     rows, limits = [], []
     for chosen, sign in ((~low | high, 1.0), (~high | low, -1.0)):
         # sign (F − J y) <= t: no gain in lowering what is not at its lower bound, or in raising

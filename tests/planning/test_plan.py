@@ -12,7 +12,15 @@ from cdsm.support.values import Array
 from tests.planning.test_range import corners
 from tests.support import arms
 from tests.support.differences import central_difference
-from tests.support.locked import LENGTH, STRAND, hinge, soft, soft_hinge
+from tests.support.locked import (
+    LENGTH,
+    STRAND,
+    hinge,
+    original_lengths,
+    soft,
+    soft_hinge,
+    some_arm,
+)
 from tests.support.paths import DOWN
 
 ARMS: dict[str, tuple[str, int, int, cdsm.Elasticity, float, float]] = {
@@ -187,3 +195,31 @@ def test_what_cannot_be_hit_is_missed_by_less_than_any_sample() -> None:
 def test_targets_that_make_no_sense_are_named(direction: Any, target: Any, message: str) -> None:
     with pytest.raises(cdsm.InvalidInput, match=message):
         cdsm.plan_stiffness(hinge().at([0.1]), direction, target, 50.0)
+
+
+def test_rest_lengths_are_those_of_the_wire_without_strain() -> None:
+    """Springs, strands, drives: the motor pays out what the tension has not stretched."""
+    arm = some_arm("universal-3-8-all")
+    pose = arms.random_posture(arm, 11, reach=0.25)
+    attainable = cdsm.stiffness_range(pose, DOWN, 40.0, 300.0, starts=4)
+    target = 0.5 * (attainable.low + attainable.high)
+    plan = cdsm.plan_stiffness(pose, DOWN, target, 40.0, 300.0)
+    expected = original_lengths(pose, plan.tension.values)
+    np.testing.assert_allclose(plan.rest_lengths, expected, rtol=1e-12)
+    assert (plan.rest_lengths < plan.cable_lengths)[arm.cables.position_controlled].all()
+    path = cdsm.plan_path(arm, DOWN, target, 40.0, 300.0, angles=[pose.q])
+    held = original_lengths(pose, path.tensions[0])[arm.cables.position_controlled]
+    np.testing.assert_allclose(path.rest_lengths[0], held, rtol=1e-12)
+
+
+def test_a_plan_says_which_bounds_were_asked_for_and_which_held() -> None:
+    pose = (
+        soft_hinge()
+        .with_cables([cdsm.Cable(cable.name, cable.sites, STRAND) for cable in soft_hinge().cables])
+        .at([0.1])
+    )
+    attainable = cdsm.stiffness_range(pose, DOWN, 0.0, 900.0, starts=4)
+    for tension in (attainable.low_tension, attainable.high_tension):
+        np.testing.assert_array_equal(tension.minimum, 0.0)
+        np.testing.assert_array_equal(tension.minimum_held, STRAND.low)
+        np.testing.assert_array_equal(tension.maximum_held, STRAND.high)
