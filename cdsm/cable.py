@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
-from typing import Literal, SupportsIndex, final, get_args, overload
+from typing import Any, Final, Literal, SupportsIndex, final, get_args, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +30,21 @@ from cdsm.wires.elasticity import Elasticity, checked_law
 Control = Literal["position", "force"]
 
 
+def number(kind: str, default: float, *, zero: bool = False, infinite: bool = False) -> Any:
+    """Declare a number of a dataclass that :func:`check_numbers` checks against its range."""
+    return field(default=default, metadata={"range": (kind, zero, infinite)})
+
+
+def check_numbers(value: object) -> None:
+    """Check all fields of a frozen dataclass that :func:`number` declares; InvalidInput."""
+    for own in fields(value):  # type: ignore[arg-type]
+        if "range" in own.metadata:
+            kind, zero, infinite = own.metadata["range"]
+            given = getattr(value, own.name)
+            checked = checked_quantity(own.name, given, kind, zero=zero, infinite=infinite)
+            value.__dict__[own.name] = checked
+
+
 @final
 @dataclass(frozen=True)
 class Site:
@@ -46,14 +61,13 @@ class Site:
 
     link: str
     position: tuple[float, float, float]
-    friction: float = 0.0
-    wrap: float = 0.0
+    friction: float = number("friction", 0.0, zero=True)
+    wrap: float = number("wrap", 0.0, zero=True)
 
     def __post_init__(self) -> None:
         text("link", self.link)
         position = vector("position", self.position, 3, f"a point on {self.link} [m]", "length")
-        for name in ("friction", "wrap"):
-            self.__dict__[name] = checked_quantity(name, getattr(self, name), name, zero=True)
+        check_numbers(self)
         self.__dict__["position"] = tuple(position.tolist())
 
 
@@ -91,13 +105,14 @@ class Cable:
     name: str
     sites: tuple[Site, ...]
     elasticity: Elasticity
-    lead: float = 0.0
-    series_stiffness: float = math.inf
+    lead: float = number("length", 0.0, zero=True)
+    # what follows are keys of ARM.toml, for all cables or for one
+    series_stiffness: float = number("stiffness", math.inf, infinite=True)
     control: Control = "position"
-    minimum: float = 0.0
-    maximum: float = math.inf
-    slack: float = 0.0
-    gain: float = 1.0
+    minimum: float = number("tension", 0.0, zero=True)
+    maximum: float = number("tension", math.inf, zero=True, infinite=True)
+    slack: float = number("slack", 0.0, zero=True)
+    gain: float = number("gain", 1.0)
 
     def __post_init__(self) -> None:
         try:
@@ -105,22 +120,15 @@ class Cable:
             checked_law(self.elasticity)
             sites = sequence_of("sites", self.sites, Site)
             one_of("control", self.control, get_args(Control))
-            lead = checked_quantity("lead", self.lead, "length", zero=True)
-            series = checked_quantity(
-                "series_stiffness", self.series_stiffness, "stiffness", infinite=True
-            )
-            least = checked_quantity("minimum", self.minimum, "tension", zero=True)
-            most = checked_quantity("maximum", self.maximum, "tension", zero=True, infinite=True)
-            slack = checked_quantity("slack", self.slack, "slack", zero=True)
-            gain = checked_quantity("gain", self.gain, "gain")
+            check_numbers(self)
             if len(sites) < 2:
                 raise CdsmError(f"sites: {len(sites)} given; two or more Site are needed.")
-            if least > most:
-                raise CdsmError(f"tensions from {least:g} to {most:g} N; give minimum <= maximum.")
+            if self.minimum > self.maximum:
+                bounds = f"tensions from {self.minimum:g} to {self.maximum:g} N"
+                raise CdsmError(f"{bounds}; give minimum <= maximum.")
         except CdsmError as error:
             raise InvalidInput(f"cable {self.name!r}", str(error)) from None
-        self.__dict__.update(sites=sites, lead=lead, series_stiffness=series)
-        self.__dict__.update(minimum=least, maximum=most, slack=slack, gain=gain)
+        self.__dict__["sites"] = sites
         for i in {0, len(sites) - 1}.difference(self._holes):
             if sites[i].friction or sites[i].wrap:
                 why = "ends there; only" if i else "starts there. Give a lead; only"
@@ -165,6 +173,11 @@ class Cable:
         wanted = number_array("elongation", elongation)
         l_0 = _length(free_length)
         return self.elasticity._tension_of(wanted, "elongation", l_0, 1.0 / self.series_stiffness)
+
+
+_OF_ONE: Final = ("name", "sites", "elasticity", "lead")
+SETTINGS: Final = tuple(own.name for own in fields(Cable) if own.name not in _OF_ONE)
+"""Fields of a :class:`Cable` that files have as keys, for all cables or for one."""
 
 
 class Cables(tuple[Cable, ...]):

@@ -206,7 +206,7 @@ class Manipulator(Printed):
 
         The robot is a geometry in a form of :meth:`Geometry.read`, or a table ``[urdf]`` with
         ``tip`` and ``file`` (relative to the folder of the ARM.toml) or ``text``. ``cdsm new``
-        writes a file with a comment on every key.
+        writes a first one, with comments.
 
         Args:
             path: The file; :meth:`write` writes one.

@@ -6,18 +6,20 @@ import json
 import math
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import Any
+from textwrap import fill
+from typing import Any, Final
 
-from cdsm.arm_file.model import SETTINGS, read_model
-from cdsm.cable import Cable, Site, serpentine_cables
+from cdsm.arm_file.model import ArmFile, read_model
+from cdsm.cable import SETTINGS, Cable, Site, serpentine_cables
 from cdsm.definition import refuse_terms
 from cdsm.errors import FileError, GeometryError, InvalidInput
 from cdsm.manipulator import Manipulator
+from cdsm.support.described import attributes_of, in_plain_text
 from cdsm.support.files import write_text
 from cdsm.support.records import one_line_each, toml_text, verbatim
 from cdsm.support.validation import sequence_of
@@ -27,18 +29,20 @@ from cdsm.urdf_reader import read_urdf
 from cdsm.wires.catalogue import WIRES, Wire, name_of, table_of
 from cdsm.wires.elasticity import Elasticity
 
-_CABLES_HEAD = """\
-# cdsm cables. Units: m, N, N/m.
-# wire: a name, a constant rigidity EA in N, or the law of a table [wires.NAME].
-# sites: links of the robot with a point in each one's frame, from the actuator's side to the end.
-# lead: straight cable from the actuator to the first site. series_stiffness: of a spring in series;
-# none if left out. control: what the motor holds, "position" or "force". minimum, maximum: tensions
-# that the cable may carry; 0 and none if left out. slack: wire that the motor takes in before the
-# cable pulls; 0 if left out. gain: wire taken in per pull that the motor reports; 1 if left out.
-# friction, wrap (of a site): coefficient, and an angle [rad] that adds to the angle by which the
-# cable turns there; 0 if left out.
+_WIRE = "a name, a constant rigidity EA in N, or the law of a table [wires.NAME]"
 
-"""
+
+def _cables_head() -> str:
+    """Return the comment at the head of a file of cables: each key and what it means."""
+    cable = attributes_of(Cable)
+    site = attributes_of(Site)
+    meanings = {"wire": _WIRE} | {key: cable[key] for key in ("sites", "lead", *SETTINGS)}
+    meanings |= {f"{key} (of a site)": site[key] for key in ("friction", "wrap")}
+    lines = ["cdsm cables. Units: m, N, N/m, rad. What is left out has its usual value."]
+    lines += [f"{key}: {in_plain_text(meaning)}" for key, meaning in meanings.items()]
+    wrapped = (fill(line, 98, initial_indent="# ", subsequent_indent="#   ") for line in lines)
+    return "\n".join(wrapped) + "\n\n"
+
 
 _USUAL = {field.name: field.default for field in fields(Cable) + fields(Site)}
 
@@ -88,7 +92,7 @@ def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
     entries = [
         _routed(each, {"wire": values[each.elasticity], **_settings(each)}) for each in cables
     ]
-    return write_text(path, _CABLES_HEAD + toml_text({"wires": tables, "cables": entries}))
+    return write_text(path, _cables_head() + toml_text({"wires": tables, "cables": entries}))
 
 
 def _wire_tables(cables: Sequence[Cable]) -> tuple[dict[Elasticity, Any], dict[str, Any]]:
@@ -118,6 +122,17 @@ def _routed(cable: Cable, own: dict[str, Any]) -> dict[str, Any]:
     return {"name": cable.name, **lead, **own, "sites": one_line_each(sites)}
 
 
+_OTHERS: Final = ("geometry", "urdf", "cables", "wire", "original_length")
+_KEYS: Final = tuple(key for key in ArmFile.__annotations__ if key not in _OTHERS)
+"""Keys of a file that are attributes of an arm; its robot and its cables are more than one key."""
+
+_TABLES: Final[dict[str, Callable[[Any], Any]]] = {"tolerances": tolerance_table}
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
+
+
 _ARM_HEAD = (
     "# An arm of cdsm. Units: m, rad, kg, N, N/m, m/s2. Base axes: x along the straight arm.\n\n"
 )
@@ -129,8 +144,8 @@ def read_arm(
 ) -> dict[str, Any]:
     """Read what defines an arm. Arguments and errors are those of :meth:`cdsm.Manipulator.read`."""
     file, cables = read_model(path, wire, changes, robot=True)
-    keys = ("gravity", "tolerances", "geometry", "springs")
-    arm = {"cables": cables} | {key: getattr(file, key) for key in keys}
+    arm = {"cables": cables, "geometry": file.geometry}
+    arm |= {key: getattr(file, key) for key in _KEYS}
     if (robot := file.urdf) is None:
         return {**arm, "urdf": to_urdf(file.geometry), "tip_link": TIP}
     source = robot.text if robot.file is None else Path(path).parent / robot.file
@@ -151,9 +166,9 @@ def arm_text(arm: Manipulator) -> str:
     owns = [{"wire": values[each.elasticity]} | _settings(each) for each in cables]
     shared = {key: x for key, x in owns[0].items() if all(own.get(key) == x for own in owns)}
     owns = [{key: x for key, x in own.items() if key not in shared} for own in owns]
-    data: dict[str, Any] = {"gravity": arm.gravity.tolist()}
-    data |= {"springs": arm.own_springs}
-    data |= {**shared, "wires": tables, "tolerances": tolerance_table(arm.tolerances)}
+    definition = arm.__getstate__()
+    data = {key: _TABLES.get(key, _as_it_is)(definition[key]) for key in _KEYS}
+    data |= shared | {"wires": tables}
     plain: tuple[Cable, ...] = ()
     if geometry is None:
         data["urdf"] = _urdf_table(arm)

@@ -8,14 +8,14 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Final, cast
+from typing import Annotated, Any, Final, TypeVar, cast, get_type_hints
 
 from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, WrapValidator
 from pydantic import ValidationInfo as Info
 
-from cdsm.cable import Cable, Cables, Control, Site, serpentine_cables
+from cdsm.cable import SETTINGS, Cable, Cables, Site, serpentine_cables
 from cdsm.errors import LINES, FileError, GeometryError, listed, warn
 from cdsm.geometry import Geometry, toml
 from cdsm.rigid_body import GRAVITY
@@ -28,6 +28,8 @@ from cdsm.tolerances import from_table as read_tolerances
 from cdsm.wires.catalogue import WIRES, Wire, as_wire, from_table, is_file, read_law, table_of
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity
+
+_Record = TypeVar("_Record")
 
 _FROM: Final = "Write an ARM.toml of it once, `cdsm new ARM.toml --from {path}"
 _OTHERS: Final = {
@@ -62,9 +64,6 @@ def _read_tables(
             table["wire"] = table_of(read_law(Path(path).parent / wire))
     return tables
 
-
-SETTINGS: Final = "series_stiffness", "control", "minimum", "maximum", "slack", "gain"
-"""Keys that are attributes of a :class:`Cable` with the same name."""
 
 _GIVEN: Final = *SETTINGS, "friction", "slack_below"  # keys of all cables or of each
 
@@ -152,17 +151,29 @@ _Label = Annotated[str, Field(min_length=1, max_length=200)]
 _Law = Annotated[Any, PlainValidator(from_table)]
 
 
+_CHECKS: Final = {"maximum": AfterValidator(_ordered)}  # of a key and those before it
+
+
+def _with_settings(cls: type[_Record]) -> type[_Record]:
+    """Give a record the keys that are fields of a :class:`Cable`; None: the key is not given."""
+    types = get_type_hints(Cable)
+    for own in fields(Cable):
+        if own.name in SETTINGS:
+            kind, zero, _ = own.metadata.get("range", ("", False, False))
+            number = Annotated[records.Number, records.in_range(kind, zero)]
+            key = (number if kind else types[own.name]) | None
+            check = _CHECKS.get(own.name)
+            cls.__annotations__[own.name] = Annotated[key, check] if check else key
+            setattr(cls, own.name, None)
+    return cls
+
+
 @record
+@_with_settings
 class _Settings:
     wire: Any = None
     slack_below: bool | None = None
     friction: records.Friction | None = None
-    series_stiffness: records.SpringStiffness | None = None
-    control: Control | None = None
-    minimum: records.Tension | None = None
-    maximum: Annotated[records.Tension | None, AfterValidator(_ordered)] = None
-    slack: records.Slack | None = None
-    gain: records.Gain | None = None
 
 
 @record
@@ -191,7 +202,17 @@ class _Routed(_Settings):
 
 
 @record
-class _Urdf:
+class Urdf:
+    """The keys of the table [urdf].
+
+    Attributes:
+        tip: Link that is the tip.
+        joint_names: Joints in the order of the angles.
+        check_inertia: ``false`` accepts moments of inertia that no body can have.
+        file: Path of the URDF, from the folder of this file.
+        text: The URDF itself, instead of its path.
+    """
+
     tip: str
     joint_names: Annotated[tuple[str, ...], Field(strict=False)] | None = None
     check_inertia: bool = True
@@ -260,7 +281,22 @@ class _Wires:
 
 @record
 class ArmFile(_Settings, _Wires):
-    """The keys of an ARM.toml, or of a file of cables; bases give ``wires`` and ``wire`` first."""
+    """The keys of an ARM.toml, or of a file of cables; bases give ``wires`` and ``wire`` first.
+
+    Attributes:
+        gravity: Vector in base axes [m/s²], or an axis such as ``"-z"``, along which it is 9.81.
+        wire: Wire of all cables: a name, a constant EA [N], a file of ``cdsm fit``, or the NAME of
+            a table ``[wires.NAME]``.
+        slack_below: ``true`` continues the law of the wire below its lowest tension, down to 0.
+        friction: Coefficient of friction in all holes [-].
+        wires: Tables ``[wires.NAME]``, laws of wires: the lines of a file of ``cdsm fit``.
+        springs: Stiffness of joints by name [N m/rad], ``joint1_1 = 2.0``; with the angle [rad] of
+            no torque ``[2.0, 0.1]``.
+        tolerances: Table of standard deviations, with a key for each source.
+        urdf: Table of a robot that no generator makes.
+        cables: Tables ``[[cables]]`` of a robot's cables; or ``[cables.NAME]`` of keys in which one
+            cable differs.
+    """
 
     wire: Annotated[Any, AfterValidator(lambda wire, info: _law_of(wire, info.data))] = None
     gravity: _Gravity = GRAVITY
@@ -268,7 +304,7 @@ class ArmFile(_Settings, _Wires):
     tolerances: Annotated[Tolerances, PlainValidator(read_tolerances)] = Tolerances()
     springs: dict[str, records.PerJoint[records.Number]] | None = None
     geometry: Annotated[Any, PlainValidator(_described), Field(alias=_ROBOT)] = None
-    urdf: Annotated[_Urdf | None, AfterValidator(_alone)] = None
+    urdf: Annotated[Urdf | None, AfterValidator(_alone)] = None
     cables: Annotated[_Tables, WrapValidator(_built), Field(validate_default=True)] = None  # type: ignore[assignment]
 
 

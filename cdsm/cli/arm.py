@@ -40,7 +40,7 @@ def new(
     overwrite: Annotated[bool, opt("Replace the file.", None, "--overwrite")] = False,
     as_json: options.JsonOption = False,
 ) -> int:
-    """Write a complete ARM.toml with a comment on every key.
+    """Write a first ARM.toml, with comments.
 
     Every command reads it; sizes, wire and all else are edited in it. --from makes one of a robot.
     """

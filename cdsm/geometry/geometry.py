@@ -294,7 +294,7 @@ class Geometry(Printed):
             data, rest = toml.split_geometry(read_toml(instance("text", text, str)))
             if "urdf" in rest and not data:
                 raise GeometryError(["urdf: a robot has no geometry; use Manipulator.read"])
-            return toml.build(data)
+            return toml.build(data or rest)
         except GeometryError as error:
             raise GeometryError(error.faults, source) from None
 

@@ -3,53 +3,57 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from inspect import signature
+from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, Field
 
-from cdsm.errors import GeometryError, did_you_mean
+from cdsm.errors import GeometryError
 from cdsm.geometry.geometry import Geometry
 from cdsm.geometry.uniform import Turn
 from cdsm.support.records import Name, parse, record
 
-# keys of an ARM.toml that do not belong to the geometry; cables may belong to it
-_ARM_KEYS = (
-    *("gravity", "original_length", "wire", "wires", "urdf", "springs"),
-    *("slack_below", "friction", "series_stiffness", "control", "minimum", "maximum"),
-    *("slack", "gain", "tolerances"),
-)
+_FORMS: Final = ("sections", "universal", "hinged", "backbone", "geometry")
+"""Tables that describe a geometry; a file may have the keys of [geometry] at its top instead."""
+
+_OF_CABLES: Final = ("friction",)  # keys of a form that an arm has at its top, for its cables
 
 
 def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Split the parsed TOML of an arm into the keys of its geometry and all others.
 
+    A key that belongs into the table of the geometry counts as the geometry's, which refuses it.
     ``cables`` belongs to the geometry beside ``joints`` or ``links``, and if it is the only key.
     """
-    others = set(_ARM_KEYS)
+    forms = [key for key in _FORMS if key in data]
+    own = {*_FORMS, *_keys_of("geometry")}.union(*map(_keys_of, forms)).difference(_OF_CABLES)
     if data.keys() - {"cables"} and not data.keys() & {"joints", "links"}:
-        others.add("cables")
-    geometry = {key: value for key, value in data.items() if key not in others}
-    return geometry, {key: value for key, value in data.items() if key in others}
+        own.discard("cables")
+    geometry = {key: value for key, value in data.items() if key in own}
+    return geometry, {key: value for key, value in data.items() if key not in own}
+
+
+def _keys_of(form: str) -> set[str]:
+    """Return the keys that belong to a form of geometries."""
+    if form == "sections":
+        return {*_Sections.__dataclass_fields__}
+    return {*signature(Geometry if form == "geometry" else getattr(Geometry, form)).parameters}
 
 
 def build(data: Mapping[str, Any]) -> Geometry:
     """Build a geometry from parsed TOML as :meth:`Geometry.read`; GeometryError lists faults."""
-    forms = ("sections", "universal", "hinged", "backbone", "geometry")
-    kind = next((key for key in forms if key in data), "")
+    kind = next((key for key in _FORMS if key in data), "")
     if not kind and not data.keys() & {"joints", "links"}:
-        found = ", ".join(data) or "nothing"
-        forms_known = "[universal], [hinged], [backbone], [[sections]] or joints"
-        raise GeometryError([f"holds {found}; give {forms_known}"])
+        keys = ", ".join(data) or "nothing"
+        known = "[universal], [hinged], [backbone], [[sections]] or joints"
+        raise GeometryError([f"holds {keys}; give {known}"])
     if kind == "sections":
         return Geometry.sections(**vars(parse(_Sections, data)))
     if kind and len(data) > 1:
         inside = f"stands outside [{kind}]; if it belongs there, write it below [{kind}]"
-        said = dict.fromkeys(data, inside)
-        for key in data:
-            if hint := did_you_mean(key, _ARM_KEYS, least=0.8):
-                said[key] = f"is not a key that is known here{hint}"
-        said |= dict.fromkeys(forms, f"stands beside [{kind}]; an arm has one of them")
-        raise GeometryError([f"{key}: {said[key]}" for key in data if key != kind])
+        beside = f"stands beside [{kind}]; an arm has one of them"
+        faults = [f"{key}: {beside if key in _FORMS else inside}" for key in data if key != kind]
+        raise GeometryError(faults)
     table = data[kind] if kind else data
     if not isinstance(table, dict):
         raise GeometryError([f"{kind}: is {table!r}; give a table [{kind}]"])

@@ -53,7 +53,7 @@ def _name(value: str) -> str:
     return value
 
 
-def _in_range(kind: str, zero: bool = False, inf: bool = False) -> AfterValidator:
+def in_range(kind: str, zero: bool = False, inf: bool = False) -> AfterValidator:
     """Refuse values outside ``RANGES[kind]``; ``zero`` also allows 0, ``inf`` infinity."""
 
     def check(value: float) -> float:
@@ -75,23 +75,19 @@ def gone(remedy: str) -> BeforeValidator:
 
 Integer = Annotated[int, BeforeValidator(plain)]
 Number = Annotated[float, BeforeValidator(plain), Field(ge=-LARGEST, le=LARGEST)]
-Length = Annotated[Number, _in_range("length")]
-LengthOrZero = Annotated[Number, _in_range("length", zero=True)]
-Slack = Annotated[Number, _in_range("slack", zero=True)]
-Gain = Annotated[Number, _in_range("gain")]
-Friction = Annotated[Number, _in_range("friction", zero=True)]
-Wrap = Annotated[Number, _in_range("wrap", zero=True)]
-Mass = Annotated[Number, _in_range("mass", zero=True)]
-JointSpring = Annotated[Number, _in_range("spring", zero=True)]
-Bending = Annotated[Number, _in_range("bending stiffness")]
+Length = Annotated[Number, in_range("length")]
+LengthOrZero = Annotated[Number, in_range("length", zero=True)]
+Friction = Annotated[Number, in_range("friction", zero=True)]
+Wrap = Annotated[Number, in_range("wrap", zero=True)]
+Mass = Annotated[Number, in_range("mass", zero=True)]
+JointSpring = Annotated[Number, in_range("spring", zero=True)]
+Bending = Annotated[Number, in_range("bending stiffness")]
 Torsion = Annotated[
     float,
     Field(allow_inf_nan=True),
     BeforeValidator(plain),
-    _in_range("bending stiffness", inf=True),
+    in_range("bending stiffness", inf=True),
 ]
-SpringStiffness = Annotated[Number, _in_range("stiffness")]
-Tension = Annotated[Number, _in_range("tension", zero=True)]
 Coordinate = Annotated[Number, Field(ge=-RANGES["length"].high, le=RANGES["length"].high)]
 Direction = Annotated[tuple[Number, Number, Number], Field(strict=False), BeforeValidator(plain)]
 Point = Annotated[

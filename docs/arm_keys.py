@@ -1,0 +1,44 @@
+"""Print the table of the keys of ARM.toml, from docstrings: ``python docs/arm_keys.py``.
+
+It stands in ``docs/guide/arm_file.md``; a test compares both.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+
+import cdsm
+from cdsm.arm_file.model import ArmFile, Urdf
+from cdsm.cable import SETTINGS
+from cdsm.geometry.beams import Section
+from cdsm.support.described import attributes_of
+
+
+def table() -> str:
+    """Return the table as Markdown: where a key stands, the key, and what it means."""
+    cable = attributes_of(cdsm.Cable)
+    site = attributes_of(cdsm.Site)
+    rows = [
+        *_rows("top", attributes_of(ArmFile)),
+        *_rows("top, `[cables.NAME]`, `[[cables]]`", {key: cable[key] for key in SETTINGS}),
+        *_rows("`[[cables]]`", {key: cable[key] for key in ("name", "lead", "sites")}),
+        *_rows("`sites`", {"link": site["link"], "xyz": site["position"]}),
+        *_rows("`sites`", {key: site[key] for key in ("friction", "wrap")}),
+        *_rows("`[urdf]`", attributes_of(Urdf)),
+        *_rows("`[universal]`, `[hinged]`", attributes_of(cdsm.Geometry.universal)),
+        *_rows("`[hinged]`", {"twist": "Angle about x from each hinge axis to the next [rad]."}),
+        *_rows("`[backbone]`", attributes_of(cdsm.Geometry.backbone)),
+        *_rows("`[[backbone.sections]]`", attributes_of(Section)),
+        *_rows("`[[sections]]`", {"spread": attributes_of(cdsm.Geometry.sections)["spread"]}),
+        *_rows("`[tolerances]`", attributes_of(cdsm.Tolerances)),
+    ]
+    return "\n".join(["| where | key | meaning |", "|---|---|---|", *rows]) + "\n"
+
+
+def _rows(where: str, meanings: Mapping[str, str]) -> Iterable[str]:
+    for key, meaning in meanings.items():
+        plain = re.sub(r":\w+:`~?(?:cdsm\.)?([^`]*)`", r"`\1`", meaning).replace("``", "`")
+        yield f"| {where} | `{key}` | {plain.replace('|', '&#124;')} |"
+
+
+if __name__ == "__main__":
+    print(table())

@@ -1,0 +1,28 @@
+"""The reference of ARM.toml names every key: its table is made of the records of the keys."""
+
+import runpy
+from dataclasses import fields
+from inspect import signature
+from pathlib import Path
+
+import cdsm
+from cdsm.arm_file.model import ArmFile, Urdf
+from cdsm.cable import SETTINGS
+from cdsm.geometry.beams import Section
+from cdsm.tolerances import sources
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def test_the_page_has_every_key() -> None:
+    table = runpy.run_path(str(DOCS / "arm_keys.py"))["table"]()
+    assert table in (DOCS / "guide" / "arm_file.md").read_text(encoding="utf-8")
+    keys = {row.split(" | ")[1].strip("`") for row in table.splitlines()[2:]}
+    hidden = {"geometry", "original_length"}  # one is no key of people, one is of older files
+    expected = {field.name for field in fields(ArmFile)} - hidden
+    expected |= {field.name for record in (Urdf, Section) for field in fields(record)}
+    expected |= {*SETTINGS, *sources(), "name", "lead", "sites", "link", "xyz", "wrap", "friction"}
+    for form in (cdsm.Geometry.universal, cdsm.Geometry.hinged, cdsm.Geometry.backbone):
+        expected |= {*signature(form).parameters}
+    assert expected - keys == set()
+    assert all(row.split(" | ")[2].strip(" |") for row in table.splitlines()[2:])
