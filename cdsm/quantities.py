@@ -67,10 +67,14 @@ class Quantity(NamedTuple):
         return f"{self.words}, {self.definition}" if self.definition else self.words
 
     @property
+    def si_unit(self) -> str:
+        """SI unit, of joints that turn."""
+        return UNITS_OF_JOINTS[self.unit][0] if self.unit in UNITS_OF_JOINTS else self.unit
+
+    @property
     def display(self) -> tuple[str, float]:
         """Unit for people, and its size in SI; of joints that turn."""
-        (unit, *_) = UNITS_OF_JOINTS.get(self.unit, (self.unit,))
-        return self.shown or display_of(unit)
+        return self.shown or display_of(self.si_unit)
 
     def along(self, direction: str) -> str:
         """Return the words with a direction, which is a text such as ``(0, 0, 1)``."""
@@ -252,11 +256,9 @@ def display_of(unit: str) -> tuple[str, float]:
 
 def si_of(units: str) -> str:
     """Return an SI unit as it is written here: ``N/m`` for ``N m-1`` of a Dataset."""
-    *factors, last = units.split(" ")
-    return f"{' '.join(factors)}/{last.removesuffix('-1')}" if last.endswith("-1") else units
+    return re.sub(r" (\w+)-1", r"/\1", units)
 
 
 def udunits(unit: str) -> str:
     """Return an SI unit in the notation of UDUNITS: ``N m-1`` for ``N/m``."""
-    numerator, slash, denominator = unit.partition("/")
-    return f"{numerator} {denominator}-1" if slash else unit
+    return re.sub(r"/(\w+)", r" \1-1", unit)

@@ -13,7 +13,9 @@ from sphinx.application import Sphinx
 from sphinx.util.inspect import TypeAliasForwardRef
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent))
+sys.path[:0] = [str(HERE.parent), str(HERE)]
+
+import quantities
 
 import cdsm
 
@@ -27,6 +29,8 @@ subprocess.run(
     cwd=HERE.parent,
     stdout=subprocess.DEVNULL,
 )
+
+(HERE / "reference" / "quantities.md").write_text(quantities.page(), encoding="utf-8")
 
 
 def _addresses() -> Iterator[tuple[str, str]]:

@@ -102,6 +102,28 @@ class OfPostures(Result):
         yield "status", self.status, "1", ("pose",)
 
 
+def derive(name: str, values: Mapping[str, Array], directions: Array) -> Array:
+    """Compute a quantity of N postures from those that it reads, by its row of the table.
+
+    Args:
+        name: Name of a quantity with a formula, ``compute``.
+        values: Quantities (N, …) by name, those that it reads among them.
+        directions: Unit vectors u (D, 3), for a quantity along directions.
+
+    Returns:
+        The quantity (N, …); NaN where one that it reads does not exist.
+    """
+    quantity = QUANTITIES[name]
+    assert quantity.compute is not None
+    sources = [values[source] for source in quantity.reads]
+    exists = ~np.any([np.isnan(x).reshape(len(x), -1).any(axis=1) for x in sources], axis=0)
+    more = {"direction": directions} if "direction" in quantity.dims else {}
+    existing = np.asarray(quantity.compute(*(x[exists] for x in sources), **more))
+    derived = np.full((len(exists), *existing.shape[1:]), np.nan)
+    derived[exists] = existing
+    return derived
+
+
 def read(
     names: Collection[str], K: Array, magnitudes: Array, jacobian: Array, directions: Array
 ) -> tuple[dict[str, Array], NDArray[np.uint8]]:

@@ -12,6 +12,7 @@ import cdsm
 from cdsm.cli import options
 from cdsm.cli.options import JsonOption, file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
+from cdsm.quantities import names_of
 
 if TYPE_CHECKING:
     from cdsm.support.values import Array
@@ -103,8 +104,7 @@ def _one_target(given: float | None, of_file: Array | None) -> float | Array:
 
 _GRID = "Grid of joint angles [deg, or mm where they slide]: first, last and number, or one angle; "
 _GRID += "other joints stay at 0."
-_OUTPUTS = "Quantities of the table, such as along, tension, margin, softest, stiffest, isotropy, "
-_OUTPUTS += "tip_position, cable_lengths, payload, force_radius, tension_factor, disk_clearance."
+_OUTPUTS = f"Quantities of the table: {', '.join(names_of('sweep'))}."
 
 
 def sweep_postures(

@@ -13,13 +13,13 @@ from typing import Any, NoReturn, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.design.goals import KINDS
 from cdsm.design.problem import MISSED, DesignProblem
-from cdsm.design.quantities import Found, measure, quiet_arm
+from cdsm.design.quantities import Measured, measure, quiet_arm
 from cdsm.errors import CdsmError, unknown
 from cdsm.manipulator import UNCHECKED
 from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
+from cdsm.stiffness_matrix.prints import verdict
 from cdsm.support.format import plural
 from cdsm.support.progress import progress_bar
 from cdsm.support.tables import csv_text
@@ -47,7 +47,7 @@ class Designs(ReadOnlyState, IndexedByName):
     faults: tuple[str, ...]
 
     def __getitem__(self, key: str) -> Array:
-        """Return a quantity (D,) by its key, such as ``mass`` or ``stiffness (0, 0, 1)``.
+        """Return a quantity (D,) by its key, such as ``mass`` or ``along (0, 0, 1)``.
 
         Raises:
             InvalidInput: The quantity is not in ``problem.measures``.
@@ -114,7 +114,7 @@ class Designs(ReadOnlyState, IndexedByName):
         for variable, column in zip(problem.variables, zip(*rows, strict=True), strict=True):
             found[f"{variable.of} [{variable.unit}]" if variable.unit else variable.of] = column
         for each in problem.measures:
-            found[f"{each.key} [{KINDS[each.of].unit}]"] = self[each.key].tolist()
+            found[f"{each.key} [{each.quantity.si_unit}]"] = self[each.key].tolist()
         return found
 
     def __len__(self) -> int:
@@ -147,7 +147,7 @@ def evaluate_designs(
         return gathered(problem, rows, compute(rows))
 
 
-def gathered(problem: DesignProblem, rows: Array, found: Iterable[Found]) -> Designs:
+def gathered(problem: DesignProblem, rows: Array, found: Iterable[Measured]) -> Designs:
     """Build :class:`Designs` from ``rows``, the designs (D, n), and ``found``, their quantities."""
     values, faults = zip(*found, strict=True) if len(rows) else ((), ())
     return Designs(
@@ -161,7 +161,7 @@ def gathered(problem: DesignProblem, rows: Array, found: Iterable[Found]) -> Des
 @contextmanager
 def workers(
     problem: DesignProblem, jobs: int, progress: bool, total: int
-) -> Iterator[Callable[[Array], Iterable[Found]]]:
+) -> Iterator[Callable[[Array], Iterable[Measured]]]:
     """Open a context with a function that evaluates designs (D, n), and returns results in order.
 
     The function uses ``jobs`` processes, and moves the bar.
@@ -170,7 +170,7 @@ def workers(
     compute = partial(measure, problem)
     with progress_bar("designs", total, wanted=progress) as advance:
 
-        def counted(found: Iterable[Found]) -> Iterator[Found]:
+        def counted(found: Iterable[Measured]) -> Iterator[Measured]:
             for each in found:
                 advance(1)
                 yield each
@@ -245,9 +245,9 @@ def _first_reason(problem: DesignProblem, row: Array) -> str:
             pose = arm.at(q)
             for load in problem.loads:
                 pull = distribute_tension(pose, *bounds, load, worst_friction=worst)
-                margin = stiffness(pose, pull).margin
-                if margin <= 0.0:
-                    return f"posture {number}: UNSTABLE, least eigenvalue of K {margin:.3g} N m/rad"
+                K = stiffness(pose, pull)
+                if not K.is_stable:
+                    return f"posture {number}: {verdict(K)}"
     except CdsmError as error:
         return f"posture {number}: {str(error).replace(UNCHECKED, '')}"
     return "its tensions are at the edge"

@@ -3,57 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal, NamedTuple, final
+from typing import Final, Literal, final
 
 from cdsm.errors import InvalidInput
+from cdsm.quantities import QUANTITIES, Quantity, require_name
 from cdsm.support.format import coordinates
 from cdsm.support.validation import Direction, one_of, scalar, unit_direction
 from cdsm.support.values import Array
 
-
-class Kind(NamedTuple):
-    """Properties of a kind of quantity: its name, its units, and which values are best."""
-
-    words: str  # its name
-    unit: str  # SI unit
-    shown: tuple[str, float]  # unit shown to the user, and its size in SI
-    best: Literal["most", "least"]  # whether the largest or the smallest value is best
-    directed: bool = False  # whether it has a direction
-
-
-_ONE = ("", 1.0)
-_MM = ("mm", 1e-3)
-_STIFF = ("N/mm", 1e3)
-_N = ("N", 1.0)
-
-KINDS: Final[dict[str, Kind]] = {
-    "stiffness": Kind("least stiffness along", "N/m", _STIFF, "most", directed=True),
-    "softest": Kind("least stiffness in any direction", "N/m", _STIFF, "most"),
-    "margin": Kind("least eigenvalue of K", "N m/rad", ("N m/rad", 1.0), "most"),
-    "deflection": Kind("largest first-order deflection under the load", "m", _MM, "least"),
-    "motor_force": Kind("largest tension", "N", _N, "least"),
-    "payload": Kind("least payload along", "N", _N, "most", directed=True),
-    "force_radius": Kind("least payload in any direction", "N", _N, "most"),
-    "tension_factor": Kind("least tension factor", "1", _ONE, "most"),
-    "cable_clearance": Kind("least clearance between cables", "m", _MM, "most"),
-    "link_clearance": Kind("least clearance of cables from links", "m", _MM, "most"),
-    "disk_clearance": Kind("least clearance of cables from rims and other disks", "m", _MM, "most"),
-    "workspace": Kind("volume around the tips held", "m3", ("dm³", 1e-3), "most"),
-    "held": Kind("share of postures held", "1", ("%", 1e-2), "most"),
-    "mass": Kind("mass of the links", "kg", ("kg", 1.0), "least"),
-    "length": Kind("length", "m", _MM, "most"),
-    "wire_length": Kind("wire, leads included", "m", ("m", 1.0), "least"),
-}
-"""Quantities of a design. If a quantity depends on posture or load, its value is the worst one over
-all postures and loads that are held, except for ``workspace``, ``held`` and ``wire_length``."""
+_WHOLE: Final = ("all postures", "arm")
+"""What quantities need that are not the worst one of all postures and loads that are held."""
 
 
 @dataclass(frozen=True)
 class Measure:
     """A quantity of a design, such as its mass or its stiffness along a direction.
 
+    If it depends on posture or load, its value is the worst one of all that are held.
+
     Attributes:
-        of: Name of the quantity, a key of :data:`KINDS`.
+        of: Name of the quantity, one of a design in :data:`~cdsm.quantities.QUANTITIES`.
         direction: Direction of a stiffness or a payload: an axis such as ``"-z"``, or (3,); else
             None.
     """
@@ -62,34 +31,43 @@ class Measure:
     direction: Direction | None = None
 
     def __post_init__(self) -> None:
-        one_of("quantity of a design", self.of, KINDS)
-        if KINDS[self.of].directed and self.direction is None:
+        require_name("quantity of a design", self.of, "design")
+        has_direction = "direction" in self.quantity.dims
+        if has_direction and self.direction is None:
             raise InvalidInput("direction", f"is needed for {self.of}.")
         if self.direction is not None:
-            if not KINDS[self.of].directed:
+            if not has_direction:
                 raise InvalidInput("direction", f"has no meaning for {self.of}.")
             u = unit_direction("direction", self.direction)
             self.__dict__.update(direction=tuple(u.tolist()))
 
     @property
+    def quantity(self) -> Quantity:
+        """Description of the quantity."""
+        return QUANTITIES[self.of]
+
+    @property
     def key(self) -> str:
-        """Name of the column of the quantity, such as ``mass`` or ``stiffness (0, 0, 1)``."""
-        return self.of + self._along
+        """Name of the column of the quantity, such as ``mass`` or ``along (0, 0, 1)``."""
+        return f"{self.of} {self._along}".rstrip()
 
     @property
     def words(self) -> str:
-        """Name of the quantity as text, with its direction."""
-        return KINDS[self.of].words + self._along
+        """Name of the quantity as text, with its direction, as that of the worst case."""
+        words = self.quantity.along(self._along)
+        if self.quantity.needs in _WHOLE or words.startswith(("smallest", "largest")):
+            return words
+        return f"{'least' if self.quantity.best == 'most' else 'largest'} {words}"
 
     @property
     def _along(self) -> str:
         u = self.direction
-        return "" if u is None else f" {coordinates(u, '.3g')}"  # type: ignore[arg-type]
+        return "" if u is None else coordinates(u, ".3g")  # type: ignore[arg-type]
 
     @property
     def unit(self) -> tuple[str, float]:
         """Unit shown to the user, such as ``mm``, and its size in SI."""
-        return KINDS[self.of].shown
+        return self.quantity.display
 
     def shown(self, value: float) -> str:
         """Return a value [SI] as text, in the unit shown to the user."""
@@ -103,12 +81,12 @@ class Objective(Measure):
     """A quantity that a search maximises or minimises.
 
     Attributes:
-        of: ``"stiffness"``, ``"softest"``, ``"margin"``, ``"deflection"``, ``"motor_force"``,
+        of: ``"along"``, ``"softest"``, ``"margin"``, ``"deflection"``, ``"tension"``,
             ``"payload"``, ``"force_radius"``, ``"tension_factor"``, ``"cable_clearance"``,
             ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``, ``"held"``, ``"mass"``,
             ``"length"`` or ``"wire_length"``. A posture is held under a load if tensions within
             the bounds balance it and the arm is stable. If the value depends on posture or load,
-            it is the worst one over all that are held. ``stiffness``, ``softest`` and ``margin``
+            it is the worst one over all that are held. ``along``, ``softest`` and ``margin``
             are computed with the least tensions under the load. ``deflection`` is |C_vv f| with the
             force f of the load, to first order. Its C_vv is computed with the least tensions
             without the load, since the motors are locked before the load acts, as in
@@ -118,7 +96,7 @@ class Objective(Measure):
             they balance in every direction. ``workspace`` is the volume of the convex hull of the
             tips of held postures, ``held`` the fraction of pairs of posture and load that are held.
             :func:`~cdsm.clearance` defines clearances.
-        direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
+        direction: u of ``along`` and ``payload``: an axis such as ``"-z"``, or (3,).
         goal: ``"most"`` to maximise, ``"least"`` to minimise; None: the usual one, e.g. the most
             stiffness, the least mass.
 
@@ -131,7 +109,7 @@ class Objective(Measure):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        goal = KINDS[self.of].best if self.goal is None else self.goal
+        goal = self.quantity.best if self.goal is None else self.goal
         self.__dict__.update(goal=one_of("goal", goal, ("most", "least")))
 
     @property
@@ -147,7 +125,7 @@ class Constraint(Measure):
 
     Attributes:
         of: Name of the quantity; :class:`Objective` lists the names.
-        direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
+        direction: u of ``along`` and ``payload``: an axis such as ``"-z"``, or (3,).
         at_least: Smallest value allowed, in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; or None.
         at_most: Largest value allowed, in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; or None.
 

@@ -52,8 +52,8 @@ class DesignProblem(ReadOnlyState):
         minimum: Lower bound of all tensions [N], unless it is a variable.
         maximum: Upper bound of all tensions [N].
         worst_friction: Whether all segments of the cables stay within the bounds, whatever loads
-            came before; see :func:`~cdsm.distribute_tension`. ``motor_force`` then belongs to the
-            largest tension that friction can cause along each cable.
+            came before; see :func:`~cdsm.distribute_tension`. ``tension`` is then the largest
+            one that friction can cause along each cable.
         diameter: Diameter of the cables [m], for clearances.
 
     Raises:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cdsm.design.evaluation import Designs, explain, gathered, workers
 from cdsm.design.problem import DesignProblem
-from cdsm.design.quantities import Found
+from cdsm.design.quantities import Measured
 from cdsm.design.result import DesignSearch
 from cdsm.design.variables import WHOLE
 from cdsm.errors import need
@@ -56,7 +56,7 @@ def search_designs(
     whole_number("seed", seed, 0)
     need("design", "pymoo")
     rows: list[Array] = []
-    found: list[Found] = []
+    found: list[Measured] = []
     with (
         workers(problem, jobs, progress, steps * size) as compute,
         warnings.catch_warnings(action="ignore"),  # pymoo and its parts warn of themselves

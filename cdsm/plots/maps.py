@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput
 from cdsm.plots import style
-from cdsm.plots.style import MM, N_PER_MM
+from cdsm.plots.style import MM
+from cdsm.quantities import display_of, si_of
 from cdsm.support.status import check_sweep, status_names
 from cdsm.support.validation import one_of, scalar
 from cdsm.support.values import Array
@@ -28,14 +29,6 @@ if TYPE_CHECKING:
     View = tuple[str, int, NDArray[np.bool_], bool]  # title, normal axis, tips, whether a slice
 
 Statistic = Literal["median", "min", "max"]
-
-_UNITS: Final = {
-    "N m-1": (N_PER_MM, "N/mm"),
-    "N m rad-1": (1.0, "N m/rad"),
-    "m": (MM, "mm"),
-    "1": (1.0, "-"),
-}
-"""Factor and label of the colour bar for each unit of a Dataset."""
 
 _MOST_PANELS = 9
 _CELLS = 40  # along the longest side of a map
@@ -143,8 +136,8 @@ def plot_map(
     title = f"{dataset.attrs['title']}, {dataset.attrs['poses']}"
     if np.isfinite(every).any():
         sign = "; below 0: unstable" if quantity == "margin" else ""
-        unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))[1]
-        label = f"{f'{statistic} of a cell: ' if statistic else ''}{name} [{unit}]{sign}"
+        unit, _ = display_of(si_of(dataset[quantity].units))
+        label = f"{f'{statistic} of a cell: ' if statistic else ''}{name} [{unit or '-'}]{sign}"
         label = textwrap.fill(label, round(_CHARACTERS * len(grid) * (size + 0.5)))
         look: dict[str, Any] = {"extend": extend, "extendfrac": 0.02, "aspect": 20 * len(grid)}
         bar = figure.colorbar(colors, ax=grid, label=label, **look)
@@ -204,7 +197,8 @@ def _maps(dataset: xarray.Dataset, quantity: str, section: Any) -> Iterator[Map]
     )
     (buckled,) = (code for code, word in status_names(dataset).items() if word == "unstable")
     unstable = code == buckled
-    x = _UNITS.get(value.units, (1.0, ""))[0] * x
+    _, size = display_of(si_of(value.units))
+    x = x / size
     if quantity != "margin":
         x = np.where(unstable, np.nan, x)
     path = "distance" in dataset.coords and poses == ["pose"]  # a joint may have this name

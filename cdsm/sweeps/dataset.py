@@ -15,13 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import FileError, InvalidInput
+from cdsm.quantities import QUANTITIES, udunits
 from cdsm.status import ENTRY_STATUSES
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import JointUnits
 from cdsm.support.progress import progress_bar
+from cdsm.support.result import MOTIONS
 from cdsm.support.validation import XYZ
 from cdsm.support.values import Array
-from cdsm.sweeps.cases import CASES, QUANTITIES, Cases
+from cdsm.sweeps.cases import CASES, Cases
 
 if TYPE_CHECKING:
     import xarray
@@ -40,7 +42,7 @@ class Labelled(Cases):
     @property
     def together(self) -> int:
         """Return the number of postures that are computed together, in about a second at most."""
-        return max(1, (_SLOW if self.slow else _FAST) // self.count)
+        return max(1, (_SLOW if self.is_slow else _FAST) // self.count)
 
     def dataset(self, q: xarray.DataArray, progress: bool = False) -> xarray.Dataset:
         """Compute the cases at joint angles q (…, joint) [rad], by all threads and with a bar.
@@ -67,73 +69,72 @@ class Labelled(Cases):
             output_core_dims=dims,
             dask="parallelized",
             output_dtypes=[np.int8 if name == "status" else np.float64 for name in names],
-            dask_gufunc_kwargs={"output_sizes": {d: self.sizes[d] for each in dims for d in each}},
+            dask_gufunc_kwargs={"output_sizes": {d: self.sizes[d] for own in dims for d in own}},
         )
-        found = xarray.Dataset(dict(zip(names, variables, strict=True)), attrs=self._about())
-        found.attrs["poses"] = q.attrs.get("poses", "as given")
+        dataset = xarray.Dataset(dict(zip(names, variables, strict=True)), attrs=self._about())
+        dataset.attrs["poses"] = q.attrs.get("poses", "as given")
         for name in names:
-            found[name].attrs = self._attributes(name)
-        one = {dim: 0 for dim, several in self.names.items() if several is None}
-        return found.assign_coords(coordinates).isel(one, missing_dims="ignore")
+            dataset[name].attrs = self._attributes(name)
+        only = {dim: 0 for dim, labels in self.names.items() if labels is None}
+        return dataset.assign_coords(coordinates).isel(only, missing_dims="ignore")
 
     def _compute(
         self, q: Array, threads: int | None = 1, progress: bool = False
     ) -> tuple[NDArray[Any], ...]:
         """Compute all outputs, then ``status``, at joint angles q (…, nv) [rad]."""
         flat = q.reshape(-1, self.arm.nv)
-        found = []
+        parts = []
         with progress_bar("sweep", len(flat), wanted=progress) as advance:
-            for part in (flat[i : i + self.together] for i in range(0, len(flat), self.together)):
-                found.append(self.rows(part, threads))
+            for start in range(0, len(flat), self.together):
+                part = flat[start : start + self.together]
+                parts.append(self.rows(part, threads))
                 advance(len(part))
-        names = (*self.outputs, "status")
-        sizes = [[self.sizes[dim] for dim in _dims(name)] for name in names]
-        rows = [np.concatenate([each[name] for each in found]) for name in names]
-        shapes = [(*q.shape[:-1], *own) for own in sizes]
-        return tuple(row.reshape(shape) for row, shape in zip(rows, shapes, strict=True))
+        variables = []
+        for name in (*self.outputs, "status"):
+            rows = np.concatenate([part[name] for part in parts])
+            sizes = [self.sizes[dim] for dim in _dims(name)]
+            variables.append(rows.reshape(*q.shape[:-1], *sizes))
+        return tuple(variables)
 
     def _coordinates(self, *dims: str) -> dict[str, Any]:
         """Return the coordinates of arguments and of named dimensions, also of ``dims``."""
-        own = {"axis", *CASES, *dims, *(dim for name in self.outputs for dim in _dims(name))}
+        used = {"axis", "cable", *CASES, *dims}
+        used |= {dim for name in self.outputs for dim in _dims(name)}
         force, moment = np.split(self.wrench, 2, axis=1)
-        found: dict[str, Any] = {}
-        for name, along, values, long_name, units in (
+        low, high = self.held_bounds
+        coordinates: dict[str, Any] = {}
+        for name, of, values, long_name, units in (
             ("force", ("wrench", "axis"), force, "force on the tip, base axes", "N"),
             ("moment", ("wrench", "axis"), moment, "moment on the tip, base axes", "N m"),
-            ("minimum", ("minimum",), self.minimum, "lower bound of all tensions", "N"),
-            ("maximum", (), self.maximum, "upper bound of all tensions", "N"),
+            ("minimum", ("minimum",), self.minimum, "lower bound of all tensions, as asked", "N"),
+            ("minimum_held", ("minimum", "cable"), low, "lower bound of a tension that held", "N"),
+            ("maximum", (), self.maximum, "upper bound of all tensions, as asked", "N"),
+            ("maximum_held", ("cable",), high, "upper bound of a tension that held", "N"),
             ("diameter", (), self.diameter, "diameter of the cables", "m"),
             ("direction_vector", ("direction", "axis"), self.direction, "unit vector", "1"),
         ):
-            if own.issuperset(along):
-                found[name] = (along, values, {"long_name": long_name, "units": units})
-        joints = dict.fromkeys(("joint", "joint_column"), self.arm.joint_names)
-        axes = dict.fromkeys(("axis", "axis_column"), XYZ)
-        labels = {**axes, **joints, "cable": self.arm.cables.names, **self.names}
+            if used.issuperset(of):
+                coordinates[name] = (of, values, {"long_name": long_name, "units": units})
+        labels: dict[str, Sequence[object] | None] = {"cable": self.arm.cables.names, **self.names}
+        labels |= dict.fromkeys(("axis", "axis_column"), XYZ)
+        labels |= dict.fromkeys(("motion", "motion_column"), MOTIONS)
+        labels |= dict.fromkeys(("joint", "joint_column"), self.arm.joint_names)
         for dim, names in labels.items():
-            if dim in own - found.keys() and names is not None:
-                words = isinstance(names[0], str)
-                told = {"long_name": f"{'name' if words else 'number'} of the {dim}"}
-                told |= {} if words else {"units": "1"}
-                found[dim] = (dim, np.array(names, dtype=object if words else np.int64), told)
-        return found
+            if dim in used - coordinates.keys() and names is not None:
+                coordinates[dim] = _labels(dim, names)
+        return coordinates
 
     def _attributes(self, name: str) -> dict[str, Any]:
         """Return the attributes of an output or of ``status``."""
         if name == "status":
-            words = "what became of the entry; NaN stands only where it says so"
-            flags = {"flag_meanings": " ".join(status.word for status in ENTRY_STATUSES)}
             return {
-                "long_name": words,
+                "long_name": "what became of the entry; NaN stands only where it says so",
                 "units": "1",
-                **flags,
+                "flag_meanings": " ".join(status.word for status in ENTRY_STATUSES),
                 "flag_values": [*map(int, ENTRY_STATUSES)],
             }
-        units = QUANTITIES[name].units
-        of_slides = {"N m": "N", "N m rad-1": "N m-1"}
-        if units in of_slides:
-            units = JointUnits(self.arm.slides).joined(units, of_slides[units])
-        return {"long_name": QUANTITIES[name].long_name, "units": units}
+        unit = JointUnits(self.arm.slides).of(QUANTITIES[name].unit)
+        return {"long_name": QUANTITIES[name].text, "units": udunits(unit)}
 
     def _about(self) -> dict[str, str]:
         """Return the attributes of the Dataset, which tell the arm by the text of its ARM.toml."""
@@ -176,6 +177,15 @@ def only_writer(path: Path) -> Iterator[None]:
 
 def _dims(name: str) -> list[str]:
     """Return the dimensions of an output or of ``status`` behind those of the postures."""
-    quantity = QUANTITIES.get(name)
-    cases = () if quantity and quantity.needs == "posture" else CASES
-    return [*cases, *(quantity.dims if quantity else ())]
+    if name == "status":
+        return [*CASES]
+    quantity = QUANTITIES[name]
+    return [*(() if quantity.needs == "posture" else CASES), *quantity.dims]
+
+
+def _labels(dim: str, names: Sequence[object]) -> tuple[str, NDArray[Any], dict[str, str]]:
+    """Return the coordinate of a dimension with names or numbers."""
+    if isinstance(names[0], str):
+        return dim, np.array(names, dtype=object), {"long_name": f"name of the {dim}"}
+    about = {"long_name": f"number of the {dim}", "units": "1"}
+    return dim, np.array(names, dtype=np.int64), about

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from cdsm.batch.distribution import check_wrench_rows
 from cdsm.errors import CdsmError, FileError, InvalidInput, need
 from cdsm.manipulator import Manipulator
+from cdsm.quantities import names_of, require_name
 from cdsm.status import Status
 from cdsm.support.files import as_path, require_folder
 from cdsm.support.progress import progress_bar
@@ -33,12 +34,11 @@ from cdsm.support.validation import (
     checked_quantity,
     flag,
     instance,
-    one_of,
     sequence_of,
     text,
     unit_directions,
 )
-from cdsm.sweeps.cases import DEFAULT, QUANTITIES, require
+from cdsm.sweeps.cases import DEFAULT, require
 from cdsm.sweeps.dataset import Labelled, only_writer, read_into_memory
 from cdsm.sweeps.poses import PoseSet, angles_of, distinct
 from cdsm.tension import checked_bounds
@@ -86,7 +86,7 @@ def sweep(
             or by name, make the dimension ``wrench``.
         direction: Direction of ``along``: an axis such as ``"z"``, or (3,), any length. Several,
             axes, (D, 3) or by name, make the dimension ``direction``.
-        outputs: Names of quantities: keys of :data:`~cdsm.sweeps.cases.QUANTITIES`.
+        outputs: Names of quantities, as the reference lists them.
         worst_friction: As for :func:`~cdsm.distribute_tension`: all segments of the cables stay
             within the bounds, whatever loads came before. Then the bounds at the motors are
             narrower.
@@ -111,7 +111,9 @@ def sweep(
     need("sweep", "xarray", "dask", *(["zarr"] if store is not None else []))
     names = (outputs,) if isinstance(outputs, str) else tuple(sequence_of("outputs", outputs, str))
     if not names or len({*names}) < len(names):
-        raise InvalidInput("outputs", f"{names} given; name some of {', '.join(QUANTITIES)}, once.")
+        raise InvalidInput(
+            "outputs", f"{names} given; name some of {', '.join(names_of('sweep'))}, once."
+        )
     lows = distinct("minimum", minimum)
     for low in lows.tolist():
         checked_bounds(instance("arm", arm, Manipulator), low, maximum)
@@ -121,7 +123,7 @@ def sweep(
     u = unit_directions("direction", directions)
     cases = Labelled(
         arm=arm,
-        outputs=tuple(one_of("output", name, QUANTITIES) for name in names),
+        outputs=tuple(require_name("output", name, "sweep") for name in names),
         wrench=np.atleast_2d(W),
         minimum=lows,
         maximum=checked_quantity("maximum", maximum, "tension", zero=True, infinite=True),
@@ -204,7 +206,8 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
     except Exception as error:  # netCDF4, zarr and xarray may raise anything
         given = "give the .nc of a sweep, or the folder of its store"
         raise FileError(path, f"cannot be read as NetCDF or Zarr: {error}; {given}.") from None
-    rank = {name: i for i, name in enumerate((*QUANTITIES, "status"))}  # a folder has no order
+    order = (*names_of("sweep"), "status")  # a folder has none
+    rank = {name: i for i, name in enumerate(order)}
     # what zarr makes of names, some versions of xarray cannot write to NetCDF
     names = {name: each for name, each in found.coords.items() if each.dtype.kind == "T"}
     found = found.assign_coords({name: each.astype(object) for name, each in names.items()})

@@ -24,7 +24,7 @@ from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
 from cdsm.tolerances import Tolerances, sources
 from cdsm.tolerancing.inputs import Errors, Group
-from cdsm.tolerancing.measurand import Measurand, MeasurandName, measurand_of
+from cdsm.tolerancing.measurand import Measurand, measurand_of
 
 _LINEAR = 0.05  # largest nonlinearity with which first order is taken as sufficient
 _DRAWN = 100  # random arms that show how far from linear a measurand is
@@ -106,7 +106,7 @@ class Uncertainty(Result, Plotted):
         relative = 100.0 * self.relative
         low, high = (end / size for end in self.interval())
         own = "its own least tensions" if self.measurand.redistribute else "the tensions given"
-        with_them = "" if self.measurand.of == "tip" else f", each with {own}"
+        with_them = "" if self.measurand.quantity.needs == "posture" else f", each with {own}"
         lines = [
             *self._unstable,
             f"{self.name}: {self.shown} {unit} (one standard uncertainty, {relative:.2g} %)",
@@ -137,8 +137,8 @@ class Uncertainty(Result, Plotted):
     @property
     def _unstable(self) -> tuple[str, ...]:
         K = self.measurand.stiffness
-        of = self.measurand.of
-        return (verdict(K),) if of in ("along", "margin") and not K.is_stable else ()
+        has_stiffness = self.measurand.quantity.needs in ("stiffness", "stable arm")
+        return (verdict(K),) if has_stiffness and not K.is_stable else ()
 
     @property
     def _nonlinear(self) -> tuple[str, ...]:
@@ -169,7 +169,7 @@ def uncertainty(
     tolerances: Tolerances | None = None,
     *,
     direction: Direction | None = None,
-    of: MeasurandName = "along",
+    of: str = "along",
     cable: str | None = None,
     wrench: ArrayLike | None = None,
     redistribute: bool = False,
@@ -191,9 +191,9 @@ def uncertainty(
         pose: The posture.
         tension: A :class:`~cdsm.Tension`, or your own tensions (C,) [N].
         tolerances: Tolerances of the arm, the angles and the tensions; None: those of the arm.
-        direction: u in base axes, for ``"along"`` and ``"tip"`` only.
+        direction: u in base axes, for ``"along"`` and ``"tip_along"`` only.
         of: ``"along"``: the stiffness along u [N/m], without friction. ``"margin"``: the
-            smallest eigenvalue of K_θ [N m/rad]. ``"tip"``: the tip's coordinate along u [m].
+            smallest eigenvalue of K_θ [N m/rad]. ``"tip_along"``: the tip's coordinate along u [m].
             ``"tension"``: the least tension of a cable [N], always distributed again.
         cable: Name of the cable, for ``"tension"`` only.
         wrench: W (6,) of your own tensions, as for :func:`~cdsm.stiffness`.

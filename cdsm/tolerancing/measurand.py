@@ -7,27 +7,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.batch.quantities import Codes
+from cdsm.batch.quantities import Codes, derive
 from cdsm.batch.rows import Rows
 from cdsm.batch.solution import solve_rows
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
+from cdsm.quantities import QUANTITIES, Quantity, display_of, require_name
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.format import coordinates
+from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.validation import Direction, flag, one_of, unit_direction
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.tension import Tension, distribute_tension
 from cdsm.tolerancing.inputs import Errors, Inputs, inputs_of
 from cdsm.tolerancing.rebuilt import slopes_of
-
-MeasurandName = Literal["along", "margin", "tip", "tension"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +35,12 @@ class Measurand(ReadOnlyState):
     Attributes:
         of: Its kind; :func:`~cdsm.uncertainty` explains the names.
         stiffness: The stiffness of the arm without errors.
-        direction: Unit direction (3,) of ``along`` and ``tip``; else None.
+        direction: Unit direction (3,) of ``along`` and ``tip_along``; else None.
         cable: Index of the cable whose ``tension`` it is; None for all cables.
         redistribute: Whether each arm has its own least tensions; if not, they are measured.
     """
 
-    of: MeasurandName
+    of: str
     stiffness: Stiffness
     direction: Array | None = None
     cable: int | None = None
@@ -56,33 +54,48 @@ class Measurand(ReadOnlyState):
     @property
     def unit(self) -> tuple[str, float]:
         """Unit in which people read the value, and its size in SI."""
-        return {"along": ("N/mm", 1e3), "tip": ("mm", 1e-3)}.get(self.of, (self.si_unit, 1.0))
+        return self.quantity.shown or display_of(self.si_unit)
+
+    @property
+    def quantity(self) -> Quantity:
+        """Description of the quantity."""
+        return QUANTITIES[self.of]
 
     @property
     def si_unit(self) -> str:
         """SI unit of the value."""
-        units = {"along": "N/m", "tip": "m", "tension": "N"}
-        return units.get(self.of) or self.stiffness.posture.arm.stiffness_unit()
+        return JointUnits(self.stiffness.posture.arm.slides).of(self.quantity.unit)
 
     @property
     def name(self) -> str:
         """Name as text, with the direction or the cable."""
         if self.direction is not None:
-            what = "stiffness" if self.of == "along" else "tip"
-            return f"{what} along {coordinates(self.direction)}"
+            return self.quantity.along(coordinates(self.direction))
         if self.cable is not None:
-            return f"tension of {self.stiffness.posture.arm.cables[self.cable].name}"
-        return "smallest joint stiffness"
+            return f"{self.quantity.words} of {self.stiffness.posture.arm.cables[self.cable].name}"
+        return self.quantity.words
 
     def value(self) -> Array:
         """Return the value of the arm without errors (1,), or of each cable (C,), in SI."""
         K = self.stiffness
-        u = self.direction
         if self.of == "tension":
             return K.tension if self.cable is None else K.tension[[self.cable]]
-        if u is None:
-            return np.array([K.margin])
-        return np.array([K.along(u) if self.of == "along" else u @ K.posture.tip[:3, 3]])
+        if self.of == "along":
+            return np.array([K.along(self._directions[0])])
+        names = self.quantity.reads or (self.of,)
+        values = {name: np.asarray(_attribute(K, name))[None] for name in names}
+        return self._of(values).ravel()
+
+    @property
+    def _directions(self) -> Array:
+        """The direction as rows (1, 3); (0, 3) without one."""
+        return np.zeros((0, 3)) if self.direction is None else self.direction[None]
+
+    def _of(self, values: dict[str, Array]) -> Array:
+        """Return the quantity (N, …) from those of a batch."""
+        if self.of in values:
+            return values[self.of]
+        return derive(self.of, values, self._directions)
 
     def of_arms(self, errors: Errors, threads: int = 1) -> tuple[Array, Codes]:
         """Compute the values (N, 1 or C) of N arms with ``errors``, and the status (N,) of each."""
@@ -97,9 +110,8 @@ class Measurand(ReadOnlyState):
             assert K.distribution is not None
             held = K.distribution.minimum_held, K.distribution.maximum_held
             bounds = held[0][None], held[1][None]
-        elif self.of != "tip":  # cables only pull
+        elif self.quantity.needs != "posture":  # cables only pull
             status[F.min(axis=1) < 0.0] = Status.OUTSIDE_ELASTICITY
-        u = np.zeros((0, 3)) if self.direction is None else self.direction[None]
         q = np.tile(K.posture.q, (count, 1))
         q[:, ~arm.slides] += errors.get("joint_angle", none)
         q[:, arm.slides] += errors.get("joint_position", none)
@@ -107,24 +119,23 @@ class Measurand(ReadOnlyState):
             arm=arm,
             q=q,
             wrench=K.wrench[None],
-            names=(self.of,),
+            names=self.quantity.reads or (self.of,),
             tension=None if self.redistribute else F,
             bounds=bounds,
-            directions=u,
+            directions=self._directions,
             body=self.inputs.bodies(errors, count),
             cable_stiffness=lambda L, F, part: self._springs(errors, L, F, part),
             check_limits=False,
             status=status,
         )
         quantities, status = solve_rows(rows, threads)
-        found = quantities[self.of]
+        numbers = self._of(quantities).reshape(count, -1)
         if self.of == "tension":
-            found = found if self.cable is None else found[:, [self.cable]]
-            return found + self._of_rebuilt(errors), status
-        found = found[:, :3, 3] @ u.T if self.of == "tip" else found.reshape(count, 1)
-        found = found + self._of_rebuilt(errors)
-        status[~np.isfinite(found[:, 0]) & (status == Status.OK)] = Status.SINGULAR
-        return found, status
+            numbers = numbers if self.cable is None else numbers[:, [self.cable]]
+            return numbers + self._of_rebuilt(errors), status
+        numbers = numbers + self._of_rebuilt(errors)
+        status[~np.isfinite(numbers[:, 0]) & (status == Status.OK)] = Status.SINGULAR
+        return numbers, status
 
     def of_arm(self, arm: Manipulator) -> Array:
         """Return the value of another ``arm``, at the posture and with the tensions of this one."""
@@ -167,22 +178,28 @@ def measurand_of(
     pose: Posture,
     tension: Tension | ArrayLike,
     direction: Direction | None,
-    of: MeasurandName,
+    of: str,
     cable: str | None,
     wrench: ArrayLike | None,
     redistribute: bool,
 ) -> Measurand:
     """Check the arguments of :func:`~cdsm.uncertainty`; return the measurand they describe."""
-    one_of("measurand", of, get_args(MeasurandName))
+    require_name("measurand", of, "uncertainty")
     K = stiffness(pose, tension, wrench)
     names = pose.arm.cables.names
-    given = {"direction": (direction, of in ("along", "tip")), "cable": (cable, of == "tension")}
-    for name, (value, wanted) in given.items():
-        if (value is not None) != wanted:
-            raise InvalidInput(name, f"{'is needed' if wanted else 'has no meaning'} for {of}.")
+    for name, argument in {"direction": direction, "cable": cable}.items():
+        is_needed = name in QUANTITIES[of].dims
+        if (argument is not None) != is_needed:
+            raise InvalidInput(name, f"{'is needed' if is_needed else 'has no meaning'} for {of}.")
     again = flag("redistribute", redistribute) or of == "tension"
     if again and not (isinstance(tension, Tension) and tension.least):
         raise InvalidInput("tension", "is distributed again: give a least Tension.")
     u = None if direction is None else unit_direction("direction", direction)
     index = None if cable is None else names.index(one_of("cable", cable, names))
     return Measurand(of, K, u, index, again)
+
+
+def _attribute(K: Stiffness, name: str) -> Array | float:
+    """Return a quantity of a stiffness or of its posture."""
+    value: Array | float = getattr(K if hasattr(K, name) else K.posture, name)
+    return value

@@ -22,7 +22,7 @@ from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
 from cdsm.tolerances import Tolerances
 from cdsm.tolerancing.budget import Uncertainty, budget_of
-from cdsm.tolerancing.measurand import MeasurandName, measurand_of
+from cdsm.tolerancing.measurand import measurand_of
 
 _AGREES = 0.1  # largest difference of the ends of intervals that agree, in uncertainties
 _BLOCK = 1000  # number of draws in a block; each block has its own random numbers
@@ -122,7 +122,7 @@ def monte_carlo(
     tolerances: Tolerances | None = None,
     *,
     direction: Direction | None = None,
-    of: MeasurandName = "along",
+    of: str = "along",
     cable: str | None = None,
     wrench: ArrayLike | None = None,
     redistribute: bool = False,

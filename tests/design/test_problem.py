@@ -34,7 +34,7 @@ def problem(**changes: Any) -> cdsm.DesignProblem:
             cdsm.Variable("end@cable2_1", 1, 3),
             cdsm.Variable("wire", choices=("solid-1.2mm", 48e3)),
         ),
-        "objectives": (cdsm.Objective("motor_force"), cdsm.Objective("stiffness", "z")),
+        "objectives": (cdsm.Objective("tension"), cdsm.Objective("along", "z")),
         "postures": BENT,
         "loads": (0.0, 0.0, -2.0, 0.0, 0.0, 0.0),
         "minimum": 20.0,
@@ -48,9 +48,9 @@ def problem(**changes: Any) -> cdsm.DesignProblem:
 
 @pytest.mark.parametrize("rough", [False, True])
 def test_quantities_are_those_of_single_postures(rough: bool) -> None:
-    names = ["stiffness", "payload"]
+    names = ["along", "payload"]
     objectives = tuple(cdsm.Objective(name, "z") for name in names)
-    others = ("softest", "margin", "deflection", "motor_force", "tension_factor",
+    others = ("softest", "margin", "deflection", "tension", "tension_factor",
               "cable_clearance", "link_clearance", "disk_clearance", "workspace", "held", "mass",
               "length", "wire_length", "force_radius")  # fmt: skip
     task = problem(
@@ -64,22 +64,22 @@ def test_quantities_are_those_of_single_postures(rough: bool) -> None:
     assert arm.geometry.hole_radii == (0.025,) * 3
     found = cdsm.evaluate_designs(task, [row])
     assert "mass" in found
-    assert next(iter(found)) == "stiffness (0, 0, 1)"
+    assert next(iter(found)) == "along (0, 0, 1)"
     poses = [arm.at(q) for q in BENT]
     bounds, worst = (20.0, 400.0, task.loads[0]), {"worst_friction": rough}
     pulls = [cdsm.distribute_tension(p, *bounds, worst_friction=rough) for p in poses]
     Ks = [cdsm.stiffness(p, pull) for p, pull in zip(poses, pulls, strict=True)]
     bare = [cdsm.distribute_tension(p, 20.0, 400.0, worst_friction=rough) for p in poses]
     unloaded = [cdsm.stiffness(p, pull) for p, pull in zip(poses, bare, strict=True)]
-    largest = [F.values * np.exp(rough * cdsm.tension.grip(F.posture)) for F in pulls]
+    largest = [F.values * np.exp(rough * cdsm.tension.friction_exponents(F.posture)) for F in pulls]
     clear = [cdsm.clearance(p, 1e-3) for p in poses]
     force = task.loads[0][:3]
     expected = {
-        "stiffness (0, 0, 1)": min(K.along("z") for K in Ks),
+        "along (0, 0, 1)": min(K.along("z") for K in Ks),
         "softest": min(1.0 / np.linalg.eigvalsh(K.compliance[:3, :3])[-1] for K in Ks),
         "margin": min(K.margin for K in Ks),
         "deflection": max(np.linalg.norm(K.compliance[:3, :3] @ force) for K in unloaded),
-        "motor_force": np.max(largest),
+        "tension": np.max(largest),
         "force_radius": min(cdsm.force_polytope(p, *bounds, **worst).radius for p in poses),
         "tension_factor": min(cdsm.tension_factor(p) for p in poses),
         "cable_clearance": min(each.cables for each in clear),
@@ -154,7 +154,7 @@ def test_a_link_keeps_its_mass_per_length_and_joints_have_values_of_their_own() 
 
 
 def test_a_posture_that_is_not_held_counts_and_constraints_say_how_far() -> None:
-    mass, soft = cdsm.Constraint("mass", at_most=0.2), cdsm.Constraint("stiffness", "z", 1e3)
+    mass, soft = cdsm.Constraint("mass", at_most=0.2), cdsm.Constraint("along", "z", 1e3)
     found = cdsm.evaluate_designs(
         problem(maximum=22.0, constraints=(mass, soft)), [[0.02, 2.0, 1.0]]
     )
@@ -200,17 +200,17 @@ def test_no_design_of_the_front_is_beaten_and_it_has_the_bits_of_its_seed() -> N
     assert (np.diff(goals[found.front, 0]) >= 0.0).all()
     assert "on the front" in str(found)
     best = found.best
-    np.testing.assert_array_equal(best["motor_force"], found.evaluated["motor_force"][found.front])
+    np.testing.assert_array_equal(best["tension"], found.evaluated["tension"][found.front])
     head, *rows = best.to_csv().splitlines()
     assert len(rows) == len(found.front)
-    assert head.startswith("design,hole_radius [m],end@cable2_1,wire,motor_force [N],")
+    assert head.startswith("design,hole_radius [m],end@cable2_1,wire,tension [N],")
 
 
 def test_an_infeasible_problem_is_named() -> None:
-    task = problem(constraints=(cdsm.Constraint("stiffness", "z", at_least=1e7),))
+    task = problem(constraints=(cdsm.Constraint("along", "z", at_least=1e7),))
     with pytest.raises(InfeasibleDesign, match=r"at least 1e\+04 N/mm is asked") as caught:
         cdsm.search_designs(task, generations=2, population=4)
-    key = "stiffness (0, 0, 1)"
+    key = "along (0, 0, 1)"
     assert caught.value.constraints == (key,)
     values = cdsm.evaluate_designs(task, [caught.value.design])
     assert f"{100.0 * (1.0 - values[key][0] / 1e7):.3g} % off" in str(caught.value)
@@ -228,9 +228,11 @@ def test_an_infeasible_problem_is_named() -> None:
         (lambda: cdsm.Variable("hole_radius", -0.03, 0.03), r"-0.03 m given; 0, or 1e-06 to"),
         (lambda: cdsm.Variable("minimum", -5.0, 5.0), "cables only pull"),
         (lambda: cdsm.Variable("end", 1, 3), "name of a cable"),
-        (lambda: cdsm.Objective("stiffness"), "direction: is needed"),
+        (lambda: cdsm.Objective("along"), "direction: is needed"),
         (lambda: cdsm.Constraint("mass"), "at_least or at_most"),
         (lambda: cdsm.Objective("beauty"), "no quantity of a design is called .beauty"),
+        (lambda: cdsm.Objective("motor_force"), "did you mean 'tension'"),
+        (lambda: cdsm.Objective("stiffness", "z"), "did you mean .*'along'"),
         ({"variables": (cdsm.Variable("end@cable2_1", 1, 4),)}, "end@cable2_1.high: 4"),
         ({"variables": (cdsm.Variable("hole_radius@9", 0.01, 0.02),)}, "joints 1 to 3"),
         ({"variables": (cdsm.Variable("lead", 0.0, 0.1),) * 2}, "lead changes too"),

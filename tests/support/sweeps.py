@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 
 import cdsm
-from cdsm.sweeps.cases import QUANTITIES
+from cdsm.quantities import names_of
 from tests.support.arms import readme_geometry
 
-EVERYTHING = tuple(name for name in QUANTITIES if name != "force_radius")
+EVERYTHING = tuple(name for name in names_of("sweep") if name != "force_radius")
 """All quantities that need no upper bound of the tensions."""
 
 STEEL = cdsm.LinearElasticity(48e3)

@@ -10,8 +10,8 @@ import xarray as xr
 import cdsm
 from cdsm.measures.payload import largest_force
 from cdsm.measures.polytope import balanced
+from cdsm.quantities import QUANTITIES
 from cdsm.support.values import Array
-from cdsm.sweeps.cases import QUANTITIES
 from cdsm.tension import checked_bounds
 from tests.support.sweeps import CASES, EVERYTHING, GRID, WRENCHES, short_arm
 
@@ -34,8 +34,8 @@ def single(
     except cdsm.InvalidInput:
         return {Status.BEYOND_LIMITS}, found
     found["tip_position"] = pose.tip[:3, 3]
-    for name in ("cable_lengths", "gravity_torque", "gravity_stiffness"):
-        found[name] = getattr(pose, name)
+    found |= {"cable_lengths": pose.cable_lengths, "gravity_torque": pose.gravity_torque}
+    found |= {"gravity": pose.gravity_stiffness, "springs": arm.springs.matrix}
     found["tension_factor"] = cdsm.tension_factor(pose)
     clear = cdsm.clearance(pose)
     found |= {f"{kind}_clearance": getattr(clear, f"{kind}s") for kind in ("cable", "link", "disk")}
@@ -51,9 +51,9 @@ def single(
         K = cdsm.stiffness(pose, pull)
     except cdsm.ElasticityRangeError:  # these terms need no law
         of_steel = cdsm.stiffness(short_arm().at(q), pull.values, wrench=wrench)
-        found |= {f"{name}_stiffness": getattr(of_steel, name) for name in ("active", "load")}
+        found |= {name: getattr(of_steel, name) for name in ("active", "load")}
         return {Status.OUTSIDE_ELASTICITY}, found
-    found |= {f"{name}_stiffness": getattr(K, name) for name in ("active", "passive", "load")}
+    found |= {name: getattr(K, name) for name in ("active", "passive", "load", "compliance")}
     found |= {"joint_stiffness": K.joint, "cable_stiffness": K.cable_stiffness, "margin": K.margin}
     C = found["translational_compliance"] = K.compliance[:3, :3]
     found["along"] = np.array([K.along(u) for u in np.eye(3)])

@@ -70,14 +70,14 @@ def _asked(of: str, seed: int) -> dict[str, Any]:
         "pose": pose,
         "tension": cdsm.distribute_tension(pose, 20.0) if of == "tension" else F,
         "of": of,
-        **({"direction": along} if of in ("along", "tip") else {}),
+        **({"direction": along} if of in ("along", "tip_along") else {}),
         **({"cable": arm.cables[seed % len(arm.cables)].name} if of == "tension" else {}),
     }
 
 
 @pytest.mark.parametrize(
     ("of", "angle", "least"),
-    [("along", 0.5, 3), ("margin", 0.5, 3), ("tip", 0.5, 4), ("tension", 0.1, 2)],
+    [("along", 0.5, 3), ("margin", 0.5, 3), ("tip_along", 0.5, 4), ("tension", 0.1, 2)],
 )
 def test_first_order_is_monte_carlo_where_it_says_so(of: str, angle: float, least: int) -> None:
     """Four arms; on ``least`` of them at least, first order says that it holds."""
@@ -117,7 +117,7 @@ def test_a_sum_of_four_rectangular_errors_is_that_of_jcgm_101() -> None:
     """JCGM 101, 9.2.3: four of unit variance have u = 2 and a 95 % interval of ± 3.88."""
     u, pose = 1e-4, readme_pose().arm.at(np.zeros(8))
     tolerances = cdsm.Tolerances(link_length=cdsm.Tolerance.within(u * math.sqrt(3.0)))
-    asked: Any = {"of": "tip", "direction": "x", "draws": 200_000, "progress": False}
+    asked: Any = {"of": "tip_along", "direction": "x", "draws": 200_000, "progress": False}
     run = cdsm.monte_carlo(pose, np.full(12, 50.0), tolerances, **asked)
     assert run.budget.standard_uncertainty == pytest.approx(2.0 * u, rel=1e-9)
     assert run.budget.nonlinearity < 1e-9
