@@ -1,5 +1,6 @@
 """Sweeps say of every entry what the functions of one posture say, under the right label."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -129,6 +130,24 @@ def test_worst_friction_narrows_the_bounds_as_at_one_posture(worst: bool) -> Non
         np.testing.assert_allclose(entry.tension, pull.values, rtol=1e-9)
         polytope = cdsm.force_polytope(pose, *bounds, worst_friction=worst)
         np.testing.assert_allclose(entry.force_radius, polytope.radius, rtol=1e-7)
+
+
+def test_bounds_that_held_stand_beside_those_asked() -> None:
+    """A cable's own minimum of 10 N holds where less is asked; its label is what held."""
+    arm = short_arm()
+    own = [replace(cable, minimum=10.0 + 10.0 * (i == 2)) for i, cable in enumerate(arm.cables)]
+    own[4] = replace(own[4], maximum=80.0)
+    arm = arm.with_cables(own)
+    found = cdsm.sweep(arm, cdsm.RandomPoses(4), minimum=[0.0, 15.0], maximum=90.0)
+    np.testing.assert_array_equal(found.minimum, [0.0, 15.0])
+    np.testing.assert_array_equal(found.minimum_held.sel(cable="cable1_2"), [10.0, 15.0])
+    np.testing.assert_array_equal(found.minimum_held.sel(cable="cable1_3"), [20.0, 20.0])
+    assert found.minimum_held.dims == ("minimum", "cable")
+    assert float(found.maximum) == 90.0
+    assert float(found.maximum_held.sel(cable="cable2_2")) == 80.0
+    assert float(found.maximum_held.sel(cable="cable2_1")) == 90.0
+    pull = cdsm.sweep(arm, cdsm.RandomPoses(4), minimum=5.0, outputs="tension")
+    assert (pull.tension >= pull.minimum_held - 1e-9).where(pull.status == 0, True).all()
 
 
 def test_dimensions_and_coordinates_are_those_of_the_question(
