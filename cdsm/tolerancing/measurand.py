@@ -144,7 +144,7 @@ class Measurand(ReadOnlyState):
         tension: Tension | Array = K.tension
         if self.redistribute:
             assert K.distribution is not None
-            bounds = K.distribution.minimum, K.distribution.maximum
+            bounds = K.distribution.minimum_held, K.distribution.maximum_held
             tension = distribute_tension(pose, *bounds, K.wrench)
         wrench = None if self.redistribute else K.wrench
         return replace(self, stiffness=stiffness(pose, tension, wrench)).value()
