@@ -20,7 +20,7 @@ from scipy.linalg import qr
 from scipy.optimize import brentq
 
 from cdsm.errors import InvalidInput
-from cdsm.identification.problem import Problem
+from cdsm.identification.least_squares import LeastSquares
 from cdsm.support.values import Array, frozen
 
 _LOWER = 1e-2  # fall of χ² below that of the best fit that refutes it
@@ -111,7 +111,7 @@ class Determination:
 
 
 def interval(
-    problem: Problem, best: Array, jacobian: Array, i: int, rise: float
+    problem: LeastSquares, best: Array, jacobian: Array, i: int, rise: float
 ) -> tuple[float, float]:
     """Return the smallest and the largest value of parameter ``i`` with Δχ² ≤ ``rise``.
 
@@ -141,8 +141,8 @@ def interval(
             return math.inf
         delta = problem.cost(x) - least
         if delta < -_LOWER:
-            said = f"χ² is {-delta:.3g} lower at {problem.describe(x)} than at this result. Give "
-            raise InvalidInput("start", f"{said}identify() that as the start.")
+            fault = f"χ² is {-delta:.3g} lower at {problem.describe(x)} than at this result."
+            raise InvalidInput("start", f"{fault} Give identify() that as the start.")
         return math.sqrt(max(delta, 0.0)) - math.sqrt(rise)
 
     def limit(side: float) -> float:

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import InvalidInput
 from cdsm.identification.determination import Determination
+from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.measurement import WeightLoop
-from cdsm.identification.problem import Problem
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import aligned, coordinates
 from cdsm.support.progress import show_progress
@@ -94,8 +94,8 @@ class ExperimentPlan(Result, Plotted):
         shares = 196.0 * self.std / abs(self.values)
         cells = list[tuple[str, ...]]()
         for name, x, share in zip(self.names, self.values, shares, strict=True):
-            said = "not determined" if math.isinf(share) else f"± {share:.3g} %"
-            cells.append((name, f"{x:.4g}", said))
+            interval = "not determined" if math.isinf(share) else f"± {share:.3g} %"
+            cells.append((name, f"{x:.4g}", interval))
         rows += ["", *aligned([("parameter [own unit]", "expected", "95 %"), *cells]), ""]
         for combination in self.open_combinations:
             rows.append(f"not determined by any candidate: {combination} (relative)")
@@ -150,8 +150,8 @@ def plan_experiment(
     angles = number_array("postures", postures)
     forces = number_array("weights", weights, "force")
     if angles.ndim != 2 or not angles.size:
-        said = f"shape {angles.shape} given; (n, nv) joint angles [rad] are needed."
-        raise InvalidInput("postures", said)
+        remedy = f"shape {angles.shape} given; (n, nv) joint angles [rad] are needed."
+        raise InvalidInput("postures", remedy)
     if forces.ndim != 1 or not forces.size or forces.min() <= 0.0:
         raise InvalidInput("weights", f"{weights!r} given; positive forces (n,) [N] are needed.")
     bound = number_array("minimum", minimum)
@@ -189,21 +189,21 @@ def plan_tests(
     arguments and the errors.
     """
     if not isinstance(parameters, Mapping) or not parameters:
-        said = "give {name: expected value} for at least one."
-        raise InvalidInput("parameters", f"{parameters!r} given; {said}")
+        remedy = "give {name: expected value} for at least one."
+        raise InvalidInput("parameters", f"{parameters!r} given; {remedy}")
     values = np.array([scalar(f"parameters[{name!r}]", x) for name, x in parameters.items()])
     names = tuple(parameters)
     most = whole_number("tests", tests, 1)
     if not values.all():
-        said = "0 given; intervals are judged relative to the expected value. Give a small one "
-        said += "(commands: in ARM.toml or by --set)."
-        raise InvalidInput(f"parameters[{names[int(abs(values).argmin())]!r}]", said)
+        remedy = "0 given; intervals are judged relative to the expected value. Give a small one "
+        remedy += "(commands: in ARM.toml or by --set)."
+        raise InvalidInput(f"parameters[{names[int(abs(values).argmin())]!r}]", remedy)
     bounds = {n: (min(0.0, 2.0 * v), max(0.0, 2.0 * v)) for n, v in zip(names, values, strict=True)}
     usable = list[WeightLoop]()
     rows = list[Array]()
     failures = list[tuple[str, str]]()
     for loop in show_progress(candidates, "following the candidates", wanted=progress):
-        problem = Problem(model_of, None, [loop], bounds)
+        problem = LeastSquares(model_of, None, [loop], bounds)
         middle = np.full(len(names), 0.5)
         if isinstance(reason := problem.predict(middle), str):
             failures.append((loop.label, reason))
@@ -211,12 +211,15 @@ def plan_tests(
         usable.append(loop)
         rows.append(problem.jacobian(middle, central=True) / problem.slope(middle) * values)
     if not usable:
-        said = f"none of {len(failures)} candidates can be tested. {': '.join(failures[0])} Choose "
-        raise InvalidInput("postures", f"{said}other postures, lighter weights, higher tensions.")
+        raise InvalidInput(
+            "postures",
+            f"none of {len(failures)} candidates can be tested. {': '.join(failures[0])} Choose "
+            "other postures, lighter weights, higher tensions.",
+        )
     whole = Determination(names, np.vstack(rows), np.ones(len(names)))
     if not whole.rank:
-        said = f"no candidate determines {', '.join(names)}. Add other postures, directions or "
-        raise InvalidInput("parameters", f"{said}weights.")
+        remedy = f"no candidate determines {', '.join(names)}. Add other postures, directions or "
+        raise InvalidInput("parameters", f"{remedy}weights.")
     known = [J @ whole.coordinates for J in rows]
     return ExperimentPlan(
         names=names,

@@ -10,8 +10,8 @@ import numpy as np
 
 from cdsm.errors import InvalidInput, listed
 from cdsm.identification.identify import check_measurements, identify
+from cdsm.identification.least_squares import LeastSquares, Test
 from cdsm.identification.measurement import Measurement
-from cdsm.identification.problem import Problem, Test
 from cdsm.identification.result import Identification, independent_readings, likely
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import aligned, plural
@@ -77,7 +77,9 @@ class Explanations(Result):
         return tuple(name for name in self.names[1:] if self._beside(name)[0] == "exclusive")
 
     def __str__(self) -> str:
-        in_mm = not any(isinstance(each, Measurement) for each in self.alone[0].measurements)
+        in_mm = not any(
+            isinstance(measurement, Measurement) for measurement in self.alone[0].measurements
+        )
         rows = [("free", "value [own unit]", "χ²", "RMSE [mm]" if in_mm else "rms [σ]", "explains")]
         fits = [("nothing", "", self.unexplained, self.unexplained.size)]
         for name, fit in zip(self.names, self.alone, strict=True):
@@ -90,10 +92,10 @@ class Explanations(Result):
 
     @property
     def _deviations(self) -> Array:
-        readings = [each.readings for each in self.alone[0].measurements]
+        readings = [measurement.readings for measurement in self.alone[0].measurements]
         pairs = zip(self.alone[0].measurements, readings, strict=True)
-        sigma = [each._errors(own)[1] for each, own in pairs]
-        return np.repeat(sigma, [own.size for own in readings])
+        sigma = [measurement.errors(numbers)[1] for measurement, numbers in pairs]
+        return np.repeat(sigma, [numbers.size for numbers in readings])
 
     @property
     def verdict(self) -> tuple[str, ...]:
@@ -101,18 +103,20 @@ class Explanations(Result):
         r = self.unexplained
         best = self.best
         yes = self.explains
-        good = [name for name, each in zip(self.names, yes, strict=True) if each]
-        bad = [name for name, each in zip(self.names, yes, strict=True) if not each]
-        said = list[str]()
+        good = [name for name, explained in zip(self.names, yes, strict=True) if explained]
+        bad = [name for name, explained in zip(self.names, yes, strict=True) if not explained]
+        sentences = list[str]()
         if likely(float(r @ r), r.size):
-            said.append("The arm as it is explains these measurements; nothing need be changed.")
+            sentences.append(
+                "The arm as it is explains these measurements; nothing need be changed."
+            )
         if good:
-            said.append(f"{_verb(good, 'explains', 'each explain')} these measurements.")
+            sentences.append(f"{_verb(good, 'explains', 'each explain')} these measurements.")
         if good and bad:
-            said.append(f"{_verb(bad, 'does', 'do')} not.")
+            sentences.append(f"{_verb(bad, 'does', 'do')} not.")
         if not good:
-            said.append(f"None alone explains these measurements; {best} leaves the least χ².")
-        return (*said, *(self._beside(name)[1] for name in self.names[1:]))
+            sentences.append(f"None alone explains these measurements; {best} leaves the least χ².")
+        return (*sentences, *(self._beside(name)[1] for name in self.names[1:]))
 
     def _beside(self, name: str) -> tuple[str, str]:
         """Return how a parameter relates to the best one: in a word, and in a sentence."""
@@ -122,22 +126,29 @@ class Explanations(Result):
         fall = max(0.0, self.alone[0].chi_square - both.chi_square)
         values = ", ".join(f"{key} = {x:.4g}" for key, x in both.parameters.items())
         if fall > _NEEDED:
-            said = f"{best} and {name} together explain more: χ² falls by {fall:.3g} ({values})."
-            return "both", said
+            sentence = (
+                f"{best} and {name} together explain more: χ² falls by {fall:.3g} ({values})."
+            )
+            return "both", sentence
         if float(self.unexplained @ self.unexplained) - self.alone[i].chi_square < _NEEDED:
-            said = f"{name} alone or beside {best} changes nothing that these readings show."
-            return "idle", said
+            sentence = f"{name} alone or beside {best} changes nothing that these readings show."
+            return "idle", sentence
         if self.explains[i]:
-            alike = [f" {each}" for each in both.warnings if each.startswith("not identifiable")]
-            said = f"{best} or {name}: these readings do not tell which one."
-            return "either", said + "".join(alike[:1])
+            alike = [
+                f" {warning}" for warning in both.warnings if warning.startswith("not identifiable")
+            ]
+            sentence = f"{best} or {name}: these readings do not tell which one."
+            return "either", sentence + "".join(alike[:1])
         if fall < _NOTHING:
-            said = f"{best} and {name} exclude each other: both act on these readings alone, but "
-            said += f"beside {best} no part is left for {name} (χ² falls by {fall:.2g})."
-            return "exclusive", said
+            return "exclusive", (
+                f"{best} and {name} exclude each other: both act on these readings alone, but "
+                f"beside {best} no part is left for {name} (χ² falls by {fall:.2g})."
+            )
         r = both.correlation[0, 1]
-        said = f"{name} beside {best} is possible, not needed: χ² falls by {fall:.3g}, less than "
-        return "possible", f"{said}{_NEEDED} ({values}, correlated at {r:+.2f})."
+        return "possible", (
+            f"{name} beside {best} is possible, not needed: χ² falls by {fall:.3g}, less than "
+            f"{_NEEDED} ({values}, correlated at {r:+.2f})."
+        )
 
     def _labels(self) -> dict[str, Sequence[object]]:
         return {"explanation": self.names, "reading": self.alone[0].reading_names}
@@ -171,12 +182,12 @@ def compare_explanations(
         raise InvalidInput("free", f"{free!r} given; give the bounds of two or more parameters.")
     check_measurements(measurements)
     if (count := independent_readings(measurements)) < 3:
-        said = f"{plural(count, 'independent reading')} given; give at least three to compare."
-        raise InvalidInput("measurements", said)
+        remedy = f"{plural(count, 'independent reading')} given; give at least three to compare."
+        raise InvalidInput("measurements", remedy)
     as_it_is = _as_it_is(model_of, measurements)
     with progress_allowed(progress):
-        each = show_progress(free, "fitting each parameter")
-        fits = {name: identify(model_of, measurements, {name: free[name]}) for name in each}
+        parameters = show_progress(free, "fitting each parameter")
+        fits = {name: identify(model_of, measurements, {name: free[name]}) for name in parameters}
         names = sorted(free, key=lambda name: fits[name].chi_square)
         best = fits[names[0]]
         together = {
@@ -202,7 +213,7 @@ def _both(
     (a,) = best.names
     (b,) = other.names
     bounds = {a: free[a], b: free[b]}
-    middle = other._problem.values(np.full(1, 0.5))[0]
+    middle = other.problem.values(np.full(1, 0.5))[0]
     fits = list[Identification]()
     for start in (float(middle), other.parameters[b]):
         begin = best.parameters | {b: start}
@@ -220,10 +231,10 @@ def _as_it_is(model_of: Callable[..., Manipulator], measurements: Sequence[Test]
     try:
         arm = model_of()
     except TypeError as error:
-        said = f"has no default for a parameter ({error}); each one is freed alone."
-        raise InvalidInput("model_of", said) from error
+        fault = f"has no default for a parameter ({error}); each one is freed alone."
+        raise InvalidInput("model_of", fault) from error
     point = np.full(1, 0.5)
-    problem = Problem(lambda **_: arm, None, measurements, {"nothing": (0.0, 1.0)})
+    problem = LeastSquares(lambda **_: arm, None, measurements, {"nothing": (0.0, 1.0)})
     if isinstance(reason := problem.predict(point), str):
         raise InvalidInput("model_of", f"the arm as it is has no prediction: {reason}")
     return problem.residuals(point)

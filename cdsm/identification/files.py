@@ -62,7 +62,7 @@ def read_loops(
     cables = arm.cables.names
     units = {"test": _TEXT, "direction": _TEXT, "force": _FORCE, "minimum": _FORCE}
     units |= dict.fromkeys(("displacement", *"xyz"), _LENGTH) | dict.fromkeys(cables, _FORCE)
-    units |= zip(joints, (_LENGTH if each else ANGLE for each in arm.slides), strict=True)
+    units |= zip(joints, (_LENGTH if slides else ANGLE for slides in arm.slides), strict=True)
     table = Columns(path, units, "loops")
     refuse = table.refuse
     text = table.text
@@ -72,21 +72,25 @@ def read_loops(
         """Return the first row of a test, whose cell of a column later rows repeat."""
         first = text(rows[0], name)
         for row in rows[1:]:
-            if (found := text(row, name)) not in (first, ""):
-                said = f"{found!r} given, but {first!r} at the beginning of the test, which fixes"
-                refuse(f"line {row[0]}, column {name}: {said} it; begin another test")
+            if (entry := text(row, name)) not in (first, ""):
+                refuse(
+                    f"line {row[0]}, column {name}: {entry!r} given, but {first!r} at the "
+                    "beginning of the test, which fixes it; begin another test"
+                )
         return rows[0]
 
     def loop(label: str, rows: list[Row]) -> WeightLoop:
         direction = text(fixed(rows, "direction"), "direction")
         if direction not in AXES:
-            said = f"{direction!r} is no axis; give one of {', '.join(AXES)}"
-            refuse(f"line {rows[0][0]}, column direction: {said}")
+            fault = f"{direction!r} is no axis; give one of {', '.join(AXES)}"
+            refuse(f"line {rows[0][0]}, column direction: {fault}")
         before = [number(fixed(rows, name), name) for name in tensions]
         read = np.array([[number(row, name) for name in readings] for row in rows])
         if readings and (moved := float(np.ptp(read, axis=0).max())) > arm.length:
-            said = f"its readings span {moved:.4g} m, more than the arm is long, {arm.length:.4g} m"
-            refuse(f"test {label}: {said}; give the unit in which they were read")
+            refuse(
+                f"test {label}: its readings span {moved:.4g} m, more than the arm is long, "
+                f"{arm.length:.4g} m; give the unit in which they were read"
+            )
         return WeightLoop(
             direction=AXES[direction],
             angles=tuple(number(fixed(rows, q), q) if q in table else 0.0 for q in joints),
@@ -100,27 +104,27 @@ def read_loops(
 
     axes = [*"xyz"] if any(axis in table for axis in "xyz") else []
     readings = ["displacement"] if "displacement" in table else axes
-    given = [name for name in cables if name in table]
-    tensions = ["minimum"] if "minimum" in table else [*cables] if given else []
-    if given and tensions == ["minimum"]:
-        refuse(f"has columns minimum and {given[0]}; give one of them")
+    measured_cables = [name for name in cables if name in table]
+    tensions = ["minimum"] if "minimum" in table else [*cables] if measured_cables else []
+    if measured_cables and tensions == ["minimum"]:
+        refuse(f"has columns minimum and {measured_cables[0]}; give one of them")
     for name in ("test", "direction"):
         if name not in table:
             refuse(f"has no column {name}")
-    for name in ("force", *readings, *tensions, *(each for each in joints if each in table)):
+    for name in ("force", *readings, *tensions, *(joint for joint in joints if joint in table)):
         table.factor(name)
     if tensions and minimum is not None:
         refuse("has tensions; leave out minimum")
     if not tensions and minimum is None:
-        said = f"add a column minimum [N] or one for each cable, such as {cables[0]} [N]"
-        refuse(f"has no tensions; {said}, or give minimum")
+        remedy = f"add a column minimum [N] or one for each cable, such as {cables[0]} [N]"
+        refuse(f"has no tensions; {remedy}, or give minimum")
     bound = None if minimum is None else np.asarray(minimum).tolist()
     loops = list[WeightLoop]()
     for label, group in groupby(table.rows, lambda row: text(row, "test")):
         rows = [*group]
         if not label:
             refuse(f"line {rows[0][0]}: the test has no name")
-        if label in [each.label for each in loops]:
+        if label in [earlier.label for earlier in loops]:
             refuse(f"line {rows[0][0]}: the test {label} goes on after another one")
         try:
             loops.append(loop(label, rows))
@@ -167,7 +171,7 @@ def read_tip_positions(
         table.units |= dict.fromkeys(cables, _FORCE)
     for name in (*axes, *cables):
         table.factor(name)
-    found = []
+    positions = []
     for row in table.rows:
         filled = [name for name in (*axes, *cables) if table.text(row, name)]
         read = {name: table.number(row, name) for name in filled}
@@ -175,5 +179,5 @@ def read_tip_positions(
             table.refuse(f"line {row[0]}: no coordinate was measured")
         fields: dict[str, Any] = {axis: read[axis] for axis in axes if axis in read}
         fields[motors] = {name: value for name, value in read.items() if name in names}
-        found.append(TipPosition(**fields, std=std, label=table.text(row, "label")))
-    return tuple(found)
+        positions.append(TipPosition(**fields, std=std, label=table.text(row, "label")))
+    return tuple(positions)

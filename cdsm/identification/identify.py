@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from cdsm.errors import InvalidInput
-from cdsm.identification.measurement import Measurement, WeightLoop, name_of
-from cdsm.identification.problem import Problem, TensionOf, Test
+from cdsm.identification.least_squares import LeastSquares, TensionOf, Test
+from cdsm.identification.measurement import Measurement, WeightLoop, measurement_name
 from cdsm.identification.result import Identification, independent_readings
 from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
@@ -72,22 +72,24 @@ def identify(
     bounds = _checked_bounds(free)
     informative = independent_readings(measurements)
     if informative < len(bounds):
-        said = f"{plural(informative, 'independent reading')} given for "
-        said += f"{plural(len(bounds), 'parameter')}, {', '.join(bounds)}; give at least as many, "
-        said += "or free fewer parameters. A stiffness or a coordinate counts as one, a loop as "
-        said += "its readings minus one, as its offset is unknown."
-        raise InvalidInput("measurements", said)
-    problem = Problem(model_of, tension_of, measurements, bounds)
+        raise InvalidInput(
+            "measurements",
+            f"{plural(informative, 'independent reading')} given for "
+            f"{plural(len(bounds), 'parameter')}, {', '.join(bounds)}; give at least as many, or "
+            "free fewer parameters. A stiffness or a coordinate counts as one, a loop as its "
+            "readings minus one, as its offset is unknown.",
+        )
+    problem = LeastSquares(model_of, tension_of, measurements, bounds)
     first = _start(problem, start)
     with progress_allowed(progress), progress_bar("identifying parameters"):
         best = _optimum(problem, first)
-        found = problem.predict(best)
+        prediction = problem.predict(best)
         jacobian = problem.jacobian(best, central=True)
-    assert not isinstance(found, str)
-    r = problem.weighed(found.numbers)
-    measured = np.concatenate([each.readings for each in measurements])
-    pairs = zip(measurements, found.numbers, strict=True)
-    errors = np.concatenate([each._errors(numbers)[0] for each, numbers in pairs])
+    assert not isinstance(prediction, str)
+    r = problem.weighed(prediction.numbers)
+    measured = np.concatenate([measurement.readings for measurement in measurements])
+    pairs = zip(measurements, prediction.numbers, strict=True)
+    errors = np.concatenate([measurement.errors(numbers)[0] for measurement, numbers in pairs])
     return Identification(
         names=problem.names,
         values=frozen(problem.values(best)),
@@ -96,9 +98,9 @@ def identify(
         predicted=frozen(measured + errors),
         residuals=frozen(r),
         jacobian=frozen(jacobian / problem.slope(best)),
-        arm=found.arm,
+        arm=prediction.arm,
         unfinished=_unfinished(problem, best, jacobian),
-        _problem=problem,
+        problem=problem,
     )
 
 
@@ -106,33 +108,33 @@ def check_measurements(measurements: object) -> None:
     """Raise InvalidInput if these are no measurements, or planned ones without readings."""
     kinds = Measurement | WeightLoop | TipPosition
     if not isinstance(measurements, list | tuple) or not all(
-        isinstance(each, kinds) for each in measurements
+        isinstance(measurement, kinds) for measurement in measurements
     ):
-        said = "a list or tuple of Measurement, TipPosition and WeightLoop is needed."
-        raise InvalidInput("measurements", f"{measurements!r} given; {said}")
-    for i, each in enumerate(measurements):
-        if isinstance(each, WeightLoop) and each.displacements is None:
-            said = f"{each.label or 'the loop'} has no readings yet; give its displacements [m], "
-            said += "as with dataclasses.replace(loop, displacements=…)."
-            raise InvalidInput(f"measurements[{i}]", said)
+        remedy = "a list or tuple of Measurement, TipPosition and WeightLoop is needed."
+        raise InvalidInput("measurements", f"{measurements!r} given; {remedy}")
+    for i, measurement in enumerate(measurements):
+        if isinstance(measurement, WeightLoop) and measurement.displacements is None:
+            remedy = f"{measurement.label or 'the loop'} has no readings yet; give its "
+            remedy += "displacements [m], as with dataclasses.replace(loop, displacements=…)."
+            raise InvalidInput(f"measurements[{i}]", remedy)
 
 
 def _checked_bounds(free: object) -> dict[str, tuple[float, float]]:
     if not isinstance(free, Mapping) or not free:
-        said = "give {name: (low, high)} for at least one parameter."
-        raise InvalidInput("free", f"{free!r} given; {said}")
+        remedy = "give {name: (low, high)} for at least one parameter."
+        raise InvalidInput("free", f"{free!r} given; {remedy}")
     bounds = {}
     for name, limits in free.items():
         low, high = vector(f"free[{name!r}]", limits, 2, "the bounds (low, high)").tolist()
         # within closer bounds, rounding would hide the finite differences
         if not high - low > 1e-9 * max(abs(low), abs(high)):
-            said = f"low = {low:g}, high = {high:g} given; low must be below high. A parameter "
-            raise InvalidInput(f"free[{name!r}]", f"{said}whose value is known is not free.")
+            remedy = "low must be below high. A parameter whose value is known is not free."
+            raise InvalidInput(f"free[{name!r}]", f"low = {low:g}, high = {high:g} given; {remedy}")
         bounds[name] = (low, high)
     return bounds
 
 
-def _start(problem: Problem, start: Mapping[str, float] | None) -> Array:
+def _start(problem: LeastSquares, start: Mapping[str, float] | None) -> Array:
     """Return ``start``, or the middle of the bounds, as a point (P,) that has a prediction."""
     point = np.full(len(problem.names), 0.5)
     name = "the middle of the bounds"
@@ -142,24 +144,24 @@ def _start(problem: Problem, start: Mapping[str, float] | None) -> Array:
             raise InvalidInput("start", f"{start!r} given; {needed}")
         values = np.array([scalar(f"start[{name!r}]", start[name]) for name in problem.names])
         rows = zip(problem.names, values, problem.low, problem.high, strict=True)
-        for each, value, low, high in rows:
+        for parameter, value, low, high in rows:
             if not low <= value <= high:
-                said = f"{value:g} is outside the bounds {low:g} to {high:g}."
-                raise InvalidInput(f"start[{each!r}]", said)
+                fault = f"{value:g} is outside the bounds {low:g} to {high:g}."
+                raise InvalidInput(f"start[{parameter!r}]", fault)
         point = np.clip(problem.point(values), 0.0, 1.0)
         name = "it"
     reason = problem.predict(point)
     if isinstance(reason, str):
-        said = f"{name} does not give every measurement a stable prediction. At "
-        said += f"{problem.describe(point)}, {reason} Correct that, or give another start."
-        raise InvalidInput("start", said)
+        fault = f"{name} does not give every measurement a stable prediction. At "
+        fault += f"{problem.describe(point)}, {reason} Correct that, or give another start."
+        raise InvalidInput("start", fault)
     for i, test in enumerate(problem.measurements):
         if isinstance(test, TipPosition):
-            test._require_near(reason.arm, name_of(i, test.label))
+            test.require_near(reason.arm, measurement_name(i, test.label))
     return point
 
 
-def _optimum(problem: Problem, start: Array) -> Array:
+def _optimum(problem: LeastSquares, start: Array) -> Array:
     """Search from ``start`` (P,) for the least χ²; the search alone only approaches bounds."""
     best = problem.search(start)
     free = np.ones(best.size, dtype=bool)
@@ -176,7 +178,7 @@ def _optimum(problem: Problem, start: Array) -> Array:
     return best
 
 
-def _unfinished(problem: Problem, best: Array, jacobian: Array) -> str:
+def _unfinished(problem: LeastSquares, best: Array, jacobian: Array) -> str:
     """Return a warning if a search ended before a minimum of χ², else an empty text."""
     r = problem.residuals(best)
     gradient = r @ jacobian
@@ -190,5 +192,7 @@ def _unfinished(problem: Problem, best: Array, jacobian: Array) -> str:
         if problem.edge
         else "Give other bounds, or another start."
     )
-    said = f"no optimum within the bounds: χ² would still fall by about {fall:.3g} on the way from "
-    return f"{said}{problem.describe(best)}. {edge}"
+    return (
+        f"no optimum within the bounds: χ² would still fall by about {fall:.3g} on the way from "
+        f"{problem.describe(best)}. {edge}"
+    )

@@ -69,8 +69,6 @@ class Measurement:
     label: str = ""
     force: float = 0.0
 
-    _suffixes = ("",)  # after the label, for the name of each reading
-
     def __post_init__(self) -> None:
         value = positive("value", self.value, "N/m")
         std = positive("std", self.std, "N/m")
@@ -85,27 +83,33 @@ class Measurement:
         """Measured numbers (n,), in SI."""
         return np.array([self.value])
 
-    def _predict(self, pose: Posture, tension: Tension | ArrayLike) -> Array:
+    @property
+    def reading_suffixes(self) -> list[str]:
+        """What follows the label in the name of each reading: nothing, since there is one."""
+        return [""]
+
+    def predict(self, pose: Posture, tension: Tension | ArrayLike) -> Array:
         """Compute the stiffness (1,) [N/m] that a model of the arm would show."""
         K = stiffness(pose, tension, None if isinstance(tension, Tension) else self.wrench)
         if not K.is_stable:
             unit = pose.arm.stiffness_unit()
-            said = f"the arm buckles: the smallest stiffness is {K.margin:.3g} {unit}."
-            raise SingularStiffness(said, K.critical_direction)
+            problem = f"the arm buckles: the smallest stiffness is {K.margin:.3g} {unit}."
+            raise SingularStiffness(problem, K.critical_direction)
         value = K.along(self.direction)
         u = unit_direction("direction", self.direction)
         if self.force:
             value = weight_test(pose, K.tension, self.force * u, wrench=K.wrench).stiffness
         if not value < 1.0 / SMALLEST:
-            said = "the tip cannot move in its direction, so the stiffness is infinite."
-            raise SingularStiffness(said, u)
+            problem = "the tip cannot move in its direction, so the stiffness is infinite."
+            raise SingularStiffness(problem, u)
         return np.array([value])
 
-    def _errors(self, predicted: Array) -> tuple[Array, float]:
+    def errors(self, predicted: Array) -> tuple[Array, float]:
         """Return predicted minus measured numbers, and their standard deviation."""
         return predicted - self.value, self.std
 
-    def _shown(self, measured: Array, predicted: Array) -> list[str]:
+    def described(self, measured: Array, predicted: Array) -> list[str]:
+        """Return a measured and a predicted stiffness as texts."""
         return [f"{K[0] / 1e3:.4g} N/mm" for K in (measured, predicted)]
 
 
@@ -152,16 +156,18 @@ class WeightLoop:
         forces = number_array("forces", self.forces, "force")
         read = None
         if forces.ndim != 1 or forces.size < 2 or np.ptp(forces) == 0.0:
-            said = "a loop needs forces of at least two sizes, one after the other, as 0, 2, 4, 2, "
-            said += "0 N: only differences of readings are used."
-            raise InvalidInput("forces", f"{self.forces!r} given; {said}")
+            raise InvalidInput(
+                "forces",
+                f"{self.forces!r} given; a loop needs forces of at least two sizes, one after the "
+                "other, as 0, 2, 4, 2, 0 N: only differences of readings are used.",
+            )
         if self.displacements is not None:
             array = number_array("displacements", self.displacements, "length")
             n = forces.size
             if array.shape not in ((n,), (n, 3)):
-                said = f"one reading [m] per force is needed, ({n},) along the direction or "
-                said += f"({n}, 3) in base axes."
-                raise InvalidInput("displacements", f"shape {array.shape} given; {said}")
+                remedy = f"one reading [m] per force is needed, ({n},) along the direction or "
+                remedy += f"({n}, 3) in base axes."
+                raise InvalidInput("displacements", f"shape {array.shape} given; {remedy}")
             read = tuple(array.tolist() if array.ndim == 1 else map(tuple, array.tolist()))
         std = positive("displacement_std", self.displacement_std, "m")
         _keep(self, forces=tuple(forces.tolist()), displacements=read, displacement_std=std)
@@ -182,7 +188,8 @@ class WeightLoop:
         return unit_direction("direction", self.direction)
 
     @property
-    def _suffixes(self) -> list[str]:
+    def reading_suffixes(self) -> list[str]:
+        """What follows the label in the name of each reading: the number of its force."""
         return [f" force {k + 1}" for k in range(len(self.forces)) for _ in self.axes]
 
     @property
@@ -211,12 +218,12 @@ class WeightLoop:
             random = np.random.default_rng(whole_number("random", random, 0))
         pose = arm.at(self.angles)
         alone = replace(self, displacements=None)
-        read = alone._predict(pose, tension_before(self, pose))
+        read = alone.predict(pose, tension_before(self, pose))
         if random is not None:
             read += self.displacement_std * random.normal(size=read.size)
         return replace(self, displacements=tuple(read.tolist()))
 
-    def _predict(self, pose: Posture, tension: Tension | ArrayLike) -> Array:
+    def predict(self, pose: Posture, tension: Tension | ArrayLike) -> Array:
         """Compute how far the forces would move the tip of a model of the arm, (m,) [m]."""
         F = tension.values if isinstance(tension, Tension) else tension
         W = np.array(self.wrench) + np.pad(self.applied, ((0, 0), (0, 3)))
@@ -227,12 +234,13 @@ class WeightLoop:
             moved = np.array([equilibrium(pose, F, load).displacement for load in loads])[which]
         return np.asarray(moved @ self.axes.T).ravel()
 
-    def _errors(self, predicted: Array) -> tuple[Array, float]:
+    def errors(self, predicted: Array) -> tuple[Array, float]:
         """Return errors less their mean along each axis (the unknown zero of least χ²), and σ."""
         off = (predicted - self.readings).reshape(len(self.forces), -1)
         return (off - off.mean(axis=0)).ravel(), self.displacement_std
 
-    def _shown(self, measured: Array, predicted: Array) -> list[str]:
+    def described(self, measured: Array, predicted: Array) -> list[str]:
+        """Return the number of readings, and how far predictions are off, as texts."""
         rms = 1e6 * np.sqrt(np.mean((predicted - measured) ** 2))
         return [f"{measured.size} readings", f"off by {rms:.3g} µm rms"]
 
@@ -245,7 +253,7 @@ def tension_before(test: Measurement | WeightLoop, pose: Posture) -> Tension | A
     return distribute_tension(pose, test.minimum, wrench=test.wrench)
 
 
-def name_of(i: int, label: str) -> str:
+def measurement_name(i: int, label: str) -> str:
     """Return the name of measurement number ``i``: its label, or "[i]" if it has none."""
     return label or f"[{i}]"
 
@@ -258,31 +266,33 @@ def positive(name: str, value: object, unit: str) -> float:
     return number
 
 
-def _keep(given: Measurement | WeightLoop, **own: object) -> None:
+def _keep(measurement: Measurement | WeightLoop, **fields: object) -> None:
     """Check label, direction, wrench, angles and tensions; keep them and ``own``, as numbers."""
-    tension = given.tension
-    minimum = given.minimum
+    tension = measurement.tension
+    minimum = measurement.minimum
     if (tension is None) == (minimum is None):
-        said = "give one of tension= (measured, of each cable) and minimum= (a bound to distribute"
-        which = "neither" if tension is None else "both"
-        raise InvalidInput("tension", f"{said} from); {which} given.")
-    if not isinstance(given.label, str):
-        raise InvalidInput("label", f"{given.label!r} given; a text is needed.")
-    direction: ArrayLike = given.direction
+        raise InvalidInput(
+            "tension",
+            "give one of tension= (measured, of each cable) and minimum= (a bound to distribute "
+            f"from); {'neither' if tension is None else 'both'} given.",
+        )
+    if not isinstance(measurement.label, str):
+        raise InvalidInput("label", f"{measurement.label!r} given; a text is needed.")
+    direction: ArrayLike = measurement.direction
     if isinstance(direction, str):
         direction = axis_vector("direction", direction)
     unit_direction("direction", direction)
-    own["direction"] = tuple(vector("direction", direction, 3, "in base axes").tolist())
-    own["wrench"] = tuple(wrench_vector("wrench", given.wrench).tolist())
-    own["angles"] = _row("angles", given.angles, "one angle [rad] per joint")
+    fields["direction"] = tuple(vector("direction", direction, 3, "in base axes").tolist())
+    fields["wrench"] = tuple(wrench_vector("wrench", measurement.wrench).tolist())
+    fields["angles"] = _row("angles", measurement.angles, "one angle [rad] per joint")
     if tension is not None:
-        own["tension"] = _row("tension", tension, "one tension [N] per cable")
+        fields["tension"] = _row("tension", tension, "one tension [N] per cable")
     elif np.ndim(minimum) == 0:  # type: ignore[arg-type]
-        own["minimum"] = scalar("minimum", minimum)
+        fields["minimum"] = scalar("minimum", minimum)
     else:
-        own["minimum"] = _row("minimum", minimum, "one bound [N] per cable")
-    for name, entry in own.items():
-        object.__setattr__(given, name, entry)
+        fields["minimum"] = _row("minimum", minimum, "one bound [N] per cable")
+    for name, entry in fields.items():
+        object.__setattr__(measurement, name, entry)
 
 
 def _row(name: str, value: object, meaning: str) -> tuple[float, ...]:

@@ -14,8 +14,8 @@ from scipy.special import chdtr, chdtrc, ndtri
 
 from cdsm.errors import InvalidInput
 from cdsm.identification.determination import Determination, interval
-from cdsm.identification.measurement import WeightLoop, name_of
-from cdsm.identification.problem import Problem, Test
+from cdsm.identification.least_squares import LeastSquares, Test
+from cdsm.identification.measurement import WeightLoop, measurement_name
 from cdsm.manipulator import Manipulator
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import aligned
@@ -37,8 +37,10 @@ def likely(chi_square: float, freedom: int) -> bool:
 
 def independent_readings(measurements: Sequence[Test]) -> int:
     """Return the number of readings, less one for each axis of a loop: its offset is unknown."""
-    offsets = sum(len(each.axes) for each in measurements if isinstance(each, WeightLoop))
-    return sum(each.readings.size for each in measurements) - offsets
+    offsets = sum(
+        len(measurement.axes) for measurement in measurements if isinstance(measurement, WeightLoop)
+    )
+    return sum(measurement.readings.size for measurement in measurements) - offsets
 
 
 @final
@@ -61,6 +63,7 @@ class Identification(Result, Plotted):
         jacobian: J = ∂r/∂p (n, P).
         arm: Arm with these values.
         unfinished: Why the search ended before the optimum; empty if it did not.
+        problem: The least squares that were solved.
     """
 
     _headline = "chi_square"
@@ -76,7 +79,7 @@ class Identification(Result, Plotted):
     jacobian: Array
     arm: Manipulator
     unfinished: str
-    _problem: Problem
+    problem: LeastSquares
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -86,12 +89,12 @@ class Identification(Result, Plotted):
     @quantity(_MIXED, "reading")
     def measured(self) -> Array:
         """Measured numbers (n,): stiffnesses [N/m], displacements of loops and coordinates [m]."""
-        return frozen(np.concatenate([each.readings for each in self.measurements]))
+        return frozen(np.concatenate([measurement.readings for measurement in self.measurements]))
 
     @cached_property
     def measurement_of(self) -> NDArray[np.intp]:
         """Index of the measurement to which each of the n measured numbers belongs (n,)."""
-        sizes = [each.readings.size for each in self.measurements]
+        sizes = [measurement.readings.size for measurement in self.measurements]
         return frozen(np.repeat(np.arange(len(sizes)), sizes))
 
     @quantity(_OWN, "parameter")
@@ -136,18 +139,18 @@ class Identification(Result, Plotted):
     @property
     def warnings(self) -> tuple[str, ...]:
         """One sentence for each reason not to trust the result; empty if there is none."""
-        said = list[str]()
+        sentences = list[str]()
         r = self.correlation
         std = self.std
         for combination in self._determination.open_combinations:
-            said.append(
+            sentences.append(
                 f"not identifiable (rank {self.rank} of {len(self.names)}): no prediction changes "
                 f"with {combination}, so their values are one choice of many. Fix one, or measure "
                 "what separates them."
             )
         for j, i in zip(*np.triu_indices(len(self.names), 1), strict=True):
             if abs(r[i, j]) > _CORRELATED and math.isfinite(std[i]):
-                said.append(
+                sentences.append(
                     f"{self.names[j]} and {self.names[i]} are correlated at {r[i, j]:+.4f}: mostly "
                     "a combination of them is determined. Measure at other postures, directions or "
                     "tensions."
@@ -155,19 +158,19 @@ class Identification(Result, Plotted):
         for name, value, limits in zip(self.names, self.values, self.bounds, strict=True):
             for side, limit in zip(("lower", "upper"), limits, strict=True):
                 if value == limit:
-                    said.append(
+                    sentences.append(
                         f"{name} is at its {side} bound, {limit:g}: the optimum lies there or "
                         "beyond. Widen the bounds, or doubt the model."
                     )
         if not likely(self.chi_square, self.freedom):
             k = int(abs(self.residuals).argmax())
-            said.append(
-                f"the model does not explain the measurements within their σ: {self._verdict}, "
+            sentences.append(
+                f"the model does not explain the measurements within their σ: {self.verdict}, "
                 f"worst at {self.reading_names[k]} with {self.residuals[k]:+.3g} σ. Standard "
                 "deviations and intervals are valid for a right model only; from other values of "
                 "the arm the search may find a better optimum."
             )
-        return (*said, *([self.unfinished] if self.unfinished else []))
+        return (*sentences, *([self.unfinished] if self.unfinished else []))
 
     def confidence(
         self, level: float = 0.95, *, progress: bool = True
@@ -193,17 +196,17 @@ class Identification(Result, Plotted):
         """
         if not 0.0 < (level := scalar("level", level)) < 1.0:
             raise InvalidInput("level", f"{level:g} given; it must lie between 0 and 1, as 0.95.")
-        problem = self._problem
+        problem = self.problem
         rise = float(ndtri((1.0 + level) / 2.0) ** 2)
         best = problem.point(self.values)
         jacobian = self.jacobian * problem.slope(best)
-        found = dict[str, tuple[float, float]]()
+        intervals = dict[str, tuple[float, float]]()
         with progress_allowed(progress):
             for i in show_progress(range(best.size), "finding the confidence of the parameters"):
                 known = math.isfinite(self.std[i])
                 limits = interval(problem, best, jacobian, i, rise) if known else None
-                found[self.names[i]] = limits or (-math.inf, math.inf)
-        return found
+                intervals[self.names[i]] = limits or (-math.inf, math.inf)
+        return intervals
 
     def __str__(self) -> str:
         half = float(ndtri(0.975)) * self.std
@@ -215,31 +218,35 @@ class Identification(Result, Plotted):
         for name, row in zip(self.names, rows, strict=True):
             lines.append((name, *(f"{x:.4g}" for x in row)))
         tests: list[Sequence[str]] = [("measurement", "measured", "predicted", "worst residual")]
-        for i, each in enumerate(self.measurements):
-            own = self.measurement_of == i
-            said = each._shown(self.measured[own], self.predicted[own])
-            worst = f"{max(self.residuals[own], key=abs):.2f} σ"
-            tests.append((name_of(i, each.label), *said, worst))
+        for i, measurement in enumerate(self.measurements):
+            rows = self.measurement_of == i
+            texts = measurement.described(self.measured[rows], self.predicted[rows])
+            worst = f"{max(self.residuals[rows], key=abs):.2f} σ"
+            tests.append((measurement_name(i, measurement.label), *texts, worst))
         note = "(95 % from the std of the linear model; in Python, confidence() profiles χ²)"
         model = f"({frictionless_model(self.arm)}; secant where a force is given; "
         model += "loops with friction; tips at rest)"
-        shown = [*aligned(lines), note, "", *aligned(tests), model, "", self._verdict]
+        shown = [*aligned(lines), note, "", *aligned(tests), model, "", self.verdict]
         return "\n".join([*shown, *self.warnings])
 
     @property
     def reading_names(self) -> list[str]:
         """Name of each of the n measured numbers: the label, and the force's number or the axis."""
         pairs = enumerate(self.measurements)
-        return [f"{name_of(i, each.label)}{of}" for i, each in pairs for of in each._suffixes]
+        return [
+            f"{measurement_name(i, measurement.label)}{suffix}"
+            for i, measurement in pairs
+            for suffix in measurement.reading_suffixes
+        ]
 
     @property
-    def _verdict(self) -> str:
+    def verdict(self) -> str:
         """χ² with its probability: of right models and σ, so many have a smaller one."""
-        said = f"χ² = {self.chi_square:.4g} with {self.freedom} degrees of freedom"
+        text = f"χ² = {self.chi_square:.4g} with {self.freedom} degrees of freedom"
         if self.freedom:
             less = 100.0 * chdtr(self.freedom, self.chi_square)
-            said += f" (right models and σ: smaller in {less:.3g} % of all experiments)"
-        return f"{said}, rank {self.rank} of {len(self.names)}"
+            text += f" (right models and σ: smaller in {less:.3g} % of all experiments)"
+        return f"{text}, rank {self.rank} of {len(self.names)}"
 
     @cached_property
     def _determination(self) -> Determination:

@@ -17,7 +17,7 @@ from cdsm.support.format import coordinates, without_rounding
 from cdsm.support.validation import NO_WRENCH, number_array, scalar, wrench_vector
 from cdsm.support.values import Array
 
-OfCables = tuple[float, ...] | Mapping[str, float]
+NumbersOfCables = tuple[float, ...] | Mapping[str, float]
 """One number for each cable (C,), or numbers by the name of the cable."""
 
 _MOTORS: Final = "pull", "rest_lengths", "tension"
@@ -52,16 +52,16 @@ class TipPosition:
     y: float | None = None
     z: float | None = None
     std: float
-    pull: OfCables | None = None
-    rest_lengths: OfCables | None = None
-    tension: OfCables | None = None
+    pull: NumbersOfCables | None = None
+    rest_lengths: NumbersOfCables | None = None
+    tension: NumbersOfCables | None = None
     wrench: tuple[float, ...] = NO_WRENCH
     label: str = ""
 
     def __post_init__(self) -> None:
         if not self.axes:
             raise InvalidInput("x", "none of x, y and z given; give the coordinates measured [m].")
-        own: dict[str, object] = {}
+        fields: dict[str, object] = {}
         for axis in self.axes:
             remedy = "Leave out a coordinate that was not measured."
             try:
@@ -70,17 +70,17 @@ class TipPosition:
                 raise InvalidInput(
                     axis, f"{str(error).removeprefix(f'{axis}: ')} {remedy}"
                 ) from None
-            own[axis] = value
+            fields[axis] = value
         std = positive("std", self.std, "m")
-        if len(given := self._given) != 1:
-            said = f"give one of {', '.join(_MOTORS)}; {' and '.join(given) or 'none'} given."
-            raise InvalidInput("pull", said)
-        (name,) = given
+        if len(motors := self._given) != 1:
+            remedy = f"give one of {', '.join(_MOTORS)}; {' and '.join(motors) or 'none'} given."
+            raise InvalidInput("pull", remedy)
+        (name,) = motors
         if not isinstance(self.label, str):
             raise InvalidInput("label", f"{self.label!r} given; a text is needed.")
-        own |= {name: _numbers(name, getattr(self, name)), "std": std}
-        own["wrench"] = tuple(wrench_vector("wrench", self.wrench).tolist())
-        for key, kept in own.items():
+        fields |= {name: _numbers(name, getattr(self, name)), "std": std}
+        fields["wrench"] = tuple(wrench_vector("wrench", self.wrench).tolist())
+        for key, kept in fields.items():
             object.__setattr__(self, key, kept)
 
     @property
@@ -99,48 +99,51 @@ class TipPosition:
         return np.array([getattr(self, axis) for axis in self.axes], dtype=np.float64)
 
     @property
-    def _conditions(self) -> tuple[object, ...]:
+    def conditions(self) -> tuple[object, ...]:
         """What the motors did: equal for readings of which one prediction is enough."""
         (name,) = self._given
-        given = getattr(self, name)
-        return name, tuple(given.items()) if isinstance(given, dict) else given, self.wrench
+        numbers = getattr(self, name)
+        return name, tuple(numbers.items()) if isinstance(numbers, dict) else numbers, self.wrench
 
-    def _rest(self, arm: Manipulator, near: Posture | None = None) -> Posture:
+    def rest_posture(self, arm: Manipulator, near: Posture | None = None) -> Posture:
         """Compute where a model of the arm rests, sought from a posture ``near``."""
         (name,) = self._given
         start = None if near is None else near.q
-        given = {name: getattr(self, name)}
-        return forward_statics(arm, **given, wrench=self.wrench, start=start).pose
+        motors = {name: getattr(self, name)}
+        return forward_statics(arm, **motors, wrench=self.wrench, start=start).pose
 
-    def _coordinates(self, pose: Posture) -> Array:
+    def tip_coordinates(self, pose: Posture) -> Array:
         """Return the coordinates of the tip of a model that were measured."""
         return pose.tip[["xyz".index(axis) for axis in self.axes], 3]
 
-    def _errors(self, predicted: Array) -> tuple[Array, float]:
+    def errors(self, predicted: Array) -> tuple[Array, float]:
+        """Return predicted minus measured coordinates, and their standard deviation."""
         return predicted - self.readings, self.std
 
     @property
-    def _suffixes(self) -> list[str]:
+    def reading_suffixes(self) -> list[str]:
+        """What follows the label in the name of each reading: its axis."""
         return [f" {axis}" for axis in self.axes]
 
-    def _shown(self, measured: Array, predicted: Array) -> list[str]:
+    def described(self, measured: Array, predicted: Array) -> list[str]:
+        """Return the measured and the predicted coordinates [mm] as texts."""
         both = [coordinates(1e3 * without_rounding(p)) for p in (measured, predicted)]
-        return [f"{', '.join(self.axes)} {each} mm" for each in both]
+        return [f"{', '.join(self.axes)} {numbers} mm" for numbers in both]
 
-    def _require_near(self, arm: Manipulator, name: str) -> None:
+    def require_near(self, arm: Manipulator, name: str) -> None:
         """Raise InvalidInput if the tip of an arm of this length cannot be there."""
         far = float(np.linalg.norm(self.readings))
         if far > _FARTHEST * arm.length:
-            said = f"{name} has the tip {far:.4g} m from the base, of an arm {arm.length:.4g} m "
-            raise InvalidInput("measurements", f"{said}long: mm? Give x, y, z in m.")
+            problem = f"{name} has the tip {far:.4g} m from the base, of an arm {arm.length:.4g} m "
+            raise InvalidInput("measurements", f"{problem}long: mm? Give x, y, z in m.")
 
 
-def _numbers(name: str, given: object) -> OfCables:
+def _numbers(name: str, value: object) -> NumbersOfCables:
     """Return numbers of cables, (C,) or by name; InvalidInput says what they must be."""
-    if isinstance(given, Mapping):
-        return {cable: scalar(f"{name}[{cable!r}]", value) for cable, value in given.items()}
-    array = number_array(name, given)  # type: ignore[arg-type]
+    if isinstance(value, Mapping):
+        return {cable: scalar(f"{name}[{cable!r}]", value) for cable, value in value.items()}
+    array = number_array(name, value)  # type: ignore[arg-type]
     if array.ndim != 1 or not array.size:
-        said = "give one number per cable, or a dict by the names of cables."
-        raise InvalidInput(name, f"shape {array.shape} given; {said}")
+        remedy = "give one number per cable, or a dict by the names of cables."
+        raise InvalidInput(name, f"shape {array.shape} given; {remedy}")
     return tuple(array.tolist())

@@ -111,7 +111,7 @@ def plot_identification(fit: Identification) -> Figure:
     else:
         right.set_xlabel("reading" if loops else "measurement")
         style.whole_numbers(right.xaxis)
-    return style.titled(figure, fit._verdict)
+    return style.titled(figure, fit.verdict)
 
 
 def _plot_loops(axes: Any, fit: Identification, loops: Sequence[tuple[int, Any]]) -> None:

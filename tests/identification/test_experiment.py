@@ -8,7 +8,7 @@ import pytest
 
 import cdsm
 from cdsm.identification.experiment_plan import greedy
-from cdsm.identification.problem import Problem
+from cdsm.identification.least_squares import LeastSquares
 from tests.identification.test_loops import FREE, TRUE, hinge
 
 ASKED: Any = {
@@ -44,7 +44,7 @@ def test_a_plan_says_what_it_will_determine() -> None:
     assert PLAN.undetermined == ()
     # the covariance is that of the linearised fit to the chosen loops
     loops = [loop.simulated(hinge()) for loop in PLAN.tests]
-    problem = Problem(hinge, None, loops, FREE)
+    problem = LeastSquares(hinge, None, loops, FREE)
     point = problem.point(np.array(list(TRUE.values())))
     J = problem.jacobian(point, central=True) / problem.slope(point)
     np.testing.assert_allclose(PLAN.std, np.sqrt(np.diag(np.linalg.inv(J.T @ J))), rtol=1e-3)

@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 import cdsm
 from cdsm.identification import WeightLoop, identify
-from cdsm.identification.problem import Problem
+from cdsm.identification.least_squares import LeastSquares
 
 TRUE = {"friction": 0.1, "rigidity": 48e3}
 FREE = {"friction": (0.0, 0.5), "rigidity": (1e4, 2e5)}
@@ -79,7 +79,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     planned = [replace(loop, forces=(0.0, 12.0, 24.0, 12.0, 0.0)) for loop in PLANNED]
     held = []
     for seed in range(200):
-        problem = Problem(hinge, None, measured(seed, planned), FREE)
+        problem = LeastSquares(hinge, None, measured(seed, planned), FREE)
         truth = problem.point(np.array(list(TRUE.values())))
         best = problem.search(truth, coarse=True)
         # an interval holds a value if Δχ² with the parameter fixed there is at most its level²

@@ -11,7 +11,12 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from cdsm.errors import CdsmError, CdsmWarning, InvalidInput
-from cdsm.identification.measurement import Measurement, WeightLoop, name_of, tension_before
+from cdsm.identification.measurement import (
+    Measurement,
+    WeightLoop,
+    measurement_name,
+    tension_before,
+)
 from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
@@ -36,7 +41,7 @@ class Prediction(NamedTuple):
     numbers: list[Array]  # of each measurement
 
 
-class Problem:
+class LeastSquares:
     """Residuals r in standard deviations, as a function of scaled parameters x (P,).
 
     Where the model does not exist, they are infinite, and scipy's search shortens its step.
@@ -59,7 +64,7 @@ class Problem:
         self._last: tuple[bytes, Prediction | str] = b"", ""
         self._rests = dict[object, Posture]()  # of tips at the last point, by their conditions
         self.edge = ""  # where the model did not exist last, and why
-        self.has_rests = any(not isinstance(each, Measurement) for each in self.measurements)
+        self.has_rests = not all(isinstance(entry, Measurement) for entry in measurements)
 
     def _scaled(self, values: Array) -> Array:
         return np.asarray(np.log(values, out=values.copy(), where=self._by_log))
@@ -111,40 +116,41 @@ class Problem:
                 arm = self.model_of(**parameters)
             where = ""
             instance("model_of", arm, Manipulator)
-            for i, each in enumerate(self.measurements):
-                where = f"measurement {name_of(i, each.label)}: "
-                if isinstance(each, TipPosition):
-                    if (key := each._conditions) not in rests:
-                        rests[key] = each._rest(arm, near.get(key))
-                    numbers.append(each._coordinates(rests[key]))
+            for i, measurement in enumerate(self.measurements):
+                where = f"measurement {measurement_name(i, measurement.label)}: "
+                if isinstance(measurement, TipPosition):
+                    if (key := measurement.conditions) not in rests:
+                        rests[key] = measurement.rest_posture(arm, near.get(key))
+                    numbers.append(measurement.tip_coordinates(rests[key]))
                     continue
-                pose = arm.at(each.angles)
+                pose = arm.at(measurement.angles)
                 if self.tension_of is None:
-                    tension = tension_before(each, pose)
+                    tension = tension_before(measurement, pose)
                 else:
-                    tension = self.tension_of(pose, each, **parameters)
-                numbers.append(each._predict(pose, tension))
+                    tension = self.tension_of(pose, measurement, **parameters)
+                numbers.append(measurement.predict(pose, tension))
         except CdsmError as error:
             return f"{where}{error}"
         except Exception as error:
             name = "tension_of" if self.tension_of and where.startswith("meas") else "model_of"
             remedy = "Correct it, narrow the bounds, or let it raise a CdsmError where there is no"
-            said = f"fails at {self.describe(x)}: {error!r}. {remedy} such arm."
-            raise InvalidInput(name, said) from error
+            fault = f"fails at {self.describe(x)}: {error!r}."
+            raise InvalidInput(name, f"{fault} {remedy} such arm.") from error
         return Prediction(arm, numbers)
 
     def weighed(self, numbers: Sequence[Array]) -> Array:
         """Return the residuals r (n,) of predicted ``numbers``."""
         pairs = zip(self.measurements, numbers, strict=True)
-        errors = (each._errors(found) for each, found in pairs)
+        errors = (measurement.errors(predicted) for measurement, predicted in pairs)
         return np.concatenate([off / std for off, std in errors])
 
     def residuals(self, x: Array, *, beside: bool = False) -> Array:
         """Compute r (n,) at a point, or one ``beside`` the last; inf without a model."""
-        found = self._predict(x, {}, self._rests) if beside else self.predict(x)
-        if isinstance(found, str):
-            return np.full(sum(each.readings.size for each in self.measurements), np.inf)
-        return self.weighed(found.numbers)
+        prediction = self._predict(x, {}, self._rests) if beside else self.predict(x)
+        if isinstance(prediction, str):
+            count = sum(measurement.readings.size for measurement in self.measurements)
+            return np.full(count, np.inf)
+        return self.weighed(prediction.numbers)
 
     def cost(self, x: Array) -> float:
         """Compute χ² = Σ r² at a point."""
@@ -169,9 +175,11 @@ class Problem:
                     if not central:
                         break
             if not sides:
-                said = "there is a prediction for all measurements, but none for a slightly smaller"
-                said = f"at {self.describe(x)} {said} or larger {self.names[i]}. Change the bounds."
-                raise InvalidInput("free", said)
+                raise InvalidInput(
+                    "free",
+                    f"at {self.describe(x)} there is a prediction for all measurements, but none "
+                    f"for a slightly smaller or larger {self.names[i]}. Change the bounds.",
+                )
             (a, r_a), (b, r_b) = [*sides, (0.0, here)][:2]
             columns.append((r_a - r_b) / (a - b))
         return np.column_stack(columns)
@@ -188,7 +196,7 @@ class Problem:
         start = np.clip(x[moving], _INSIDE, 1.0 - _INSIDE)
         if not np.isfinite(self.cost(at(start))):
             return x  # the model ends here
-        found = least_squares(
+        solution = least_squares(
             lambda part: self.residuals(at(part)),
             start,
             lambda part: self.jacobian(at(part), moving),
@@ -199,4 +207,4 @@ class Problem:
             gtol=1e-12,
             max_nfev=200,
         )
-        return at(found.x)
+        return at(solution.x)
