@@ -214,6 +214,7 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
 
 
 _CHOOSE = "Design of the front to write; default: the compromise, nearest to the best of each goal."
+_CHOOSE += " If the folder has designs already, there is no search."
 
 
 def design(
@@ -234,34 +235,41 @@ def design(
     is how far the load moves the tip, to first order, with motors that are locked before it acts.
     """
     from cdsm.batch.distribution import checked_threads
+    from cdsm.design.evaluation import Designs
     from cdsm.design.problem_file import read_problem
+    from cdsm.design.search import best_of
     from cdsm.support.files import make_folder, write_text
 
     task, search = read_problem(problem)
     if (out / "arm.toml").exists() and not (out / "front.csv").exists():
         raise misuse("--out", f"{out} has an arm.toml that no search wrote; give another folder.")
     folder = make_folder(out)
-    found = cdsm.search_designs(
-        task,
-        generations=search.generations,
-        population=search.population,
-        seed=search.seed,
-        jobs=checked_threads(None),
-    )
-    number = found.compromise if choose is None else choose
-    every = write_text(folder / "designs.csv", found.evaluated.to_csv())
-    front = write_text(folder / "front.csv", found.best.to_csv())
-    if number >= (count := len(found.front)):
-        said = f"{number} given, but the front has the designs 0 to {count - 1}. See {front}, and"
-        raise misuse("--choose", f"{said} repeat the command with one of them.")
+    table = folder / "designs.csv"
+    if choose is not None and table.exists():
+        results = best_of(Designs.read(task, table), search.seed)
+    else:
+        results = cdsm.search_designs(
+            task,
+            generations=search.generations,
+            population=search.population,
+            seed=search.seed,
+            jobs=checked_threads(None),
+        )
+        write_text(table, results.evaluated.to_csv())
+    number = results.compromise if choose is None else choose
+    front = write_text(folder / "front.csv", results.best.to_csv())
+    if number >= (count := len(results.front)):
+        given = f"{number} given, but the front has the designs 0 to {count - 1}. See {front}, and"
+        again = "repeat the command with one of them, which takes no search."
+        raise misuse("--choose", f"{given} {again}")
     paths = [
-        every,
+        table,
         front,
-        cdsm.plots.save_figure(found.plot(), folder / "front.pdf"),
-        cdsm.plots.save_figure(found.arm(number).plot(), folder / "arm.pdf"),
-        *found.write_arm(folder, number),
+        cdsm.plots.save_figure(results.plot(), folder / "front.pdf"),
+        cdsm.plots.save_figure(results.arm(number).plot(), folder / "arm.pdf"),
+        *results.write_arm(folder, number),
     ]
     names = ", ".join(path.name for path in paths)
     written: Json = {"written": [str(path) for path in paths], "chosen": number}
     said = f"design {number} is written to {folder}: {names}"
-    return answer(as_json, found.to_dict() | written, found.describe(number), said)
+    return answer(as_json, results.to_dict() | written, results.describe(number), said)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -15,17 +16,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.design.problem import MISSED, DesignProblem
 from cdsm.design.quantities import Measured, measure, quiet_arm
-from cdsm.errors import CdsmError, unknown
+from cdsm.errors import CdsmError, FileError, unknown
 from cdsm.manipulator import UNCHECKED
 from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
 from cdsm.stiffness_matrix.prints import verdict
 from cdsm.support.format import plural
 from cdsm.support.progress import progress_bar
-from cdsm.support.tables import csv_text
+from cdsm.support.tables import csv_text, read_table
 from cdsm.support.validation import instance, number_array, whole_number
 from cdsm.support.values import Array, IndexedByName, ReadOnlyState, frozen
 from cdsm.tension import distribute_tension
+
+_SAME = 1e-6  # relative difference of a quantity of the same design, computed on another machine
 
 
 @final
@@ -103,19 +106,48 @@ class Designs(ReadOnlyState, IndexedByName):
         rows = enumerate(zip(*columns.values(), strict=True))
         return csv_text(["design", *columns], ([i, *row] for i, row in rows))
 
-    def columns(self) -> dict[str, Sequence[Any]]:
-        """Return a column for each variable and quantity, by its heading.
+    @classmethod
+    def read(cls, problem: DesignProblem, path: str | os.PathLike[str]) -> Designs:
+        """Read the designs of a problem from a file that :meth:`to_csv` made.
 
-        The heading has the name and the unit.
+        Raises:
+            FileError: The file cannot be read, or its designs are those of another problem.
         """
-        problem = self.problem
-        found = dict[str, Sequence[Any]]()
-        rows = [problem.values(each) for each in self.designs]
-        for variable, column in zip(problem.variables, zip(*rows, strict=True), strict=True):
-            found[f"{variable.of} [{variable.unit}]" if variable.unit else variable.of] = column
-        for each in problem.measures:
-            found[f"{each.key} [{each.quantity.si_unit}]"] = self[each.key].tolist()
-        return found
+        instance("problem", problem, DesignProblem)
+        table = read_table(path, ",")
+        count = len(problem.variables)
+        width = count + len(problem.measures)
+        none = gathered(problem, np.empty((0, count)), ())
+        other = "holds no designs of this problem; repeat the search in another folder."
+        head = ["design", *none.headings(), "feasible", "fault"]
+        if not table.rows or table.header != head or len(table.rows) < 2:
+            raise FileError(path, other)
+        try:
+            cells = [row[1 : 1 + width] for _, row in table.rows[1:]]
+            chosen = [zip(problem.variables, row[:count], strict=True) for row in cells]
+            rows = np.array([[v.number_of(cell) for v, cell in row] for row in chosen])
+            values = np.array([[float(cell) for cell in row[count:]] for row in cells])
+        except ValueError:
+            raise FileError(path, other) from None
+        faults = tuple(row[-1] for _, row in table.rows[1:])
+        designs = replace(none, designs=frozen(rows), values=frozen(values), faults=faults)
+        first = int(designs.feasible.argmax())  # the first one if none is feasible
+        again = evaluate_designs(problem, rows[first : first + 1], progress=False)
+        if not np.allclose(again.values, values[first], rtol=_SAME, equal_nan=True):
+            raise FileError(path, other)
+        return designs
+
+    def headings(self) -> list[str]:
+        """Return the heading of each variable and each quantity: its name and its unit."""
+        units = {v.of: v.unit for v in self.problem.variables}
+        units |= {m.key: m.quantity.si_unit for m in self.problem.measures}
+        return [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
+
+    def columns(self) -> dict[str, Sequence[Any]]:
+        """Return a column for each variable and quantity, by its heading."""
+        chosen = [self.problem.values(design) for design in self.designs]
+        columns = [*zip(*chosen, strict=True), *self.values.T.tolist()]
+        return dict(zip(self.headings(), columns, strict=True))
 
     def __len__(self) -> int:
         return len(self.designs)

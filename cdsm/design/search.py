@@ -69,7 +69,7 @@ def search_designs(
             return gathered(problem, designs, evaluated)
 
         _minimize(problem, evaluate, steps, size, seed)
-    return _best_of(gathered(problem, np.array(rows), found), seed)
+    return best_of(gathered(problem, np.array(rows), found), seed)
 
 
 def _minimize(
@@ -124,7 +124,7 @@ def _minimize(
     minimize(task, algorithm, ("n_gen", generations), seed=seed, copy_algorithm=False)
 
 
-def _best_of(evaluated: Designs, seed: int) -> DesignSearch:
+def best_of(evaluated: Designs, seed: int) -> DesignSearch:
     """Return the result of a search; raise InfeasibleDesign if no evaluated design is feasible."""
     front = _pareto(evaluated)
     if not len(front):

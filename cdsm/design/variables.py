@@ -142,6 +142,13 @@ class Variable:
         """Whether the variable changes the cables themselves, not a number of them."""
         return self.kind in (*WHOLE, "wire")
 
+    def number_of(self, cell: str) -> float:
+        """Return the number in a design of a value as text, in SI: of a choice its index.
+
+        Raises ValueError if it is none.
+        """
+        return float([str(x) for x in self.choices].index(cell) if self.choices else cell)
+
     def shown(self, value: Value) -> str:
         """Return a value [SI] as text, in the unit shown to the user: mm, degrees, N."""
         if isinstance(value, (str, int)):

@@ -362,6 +362,37 @@ def test_design(tmp_path: Path) -> None:
     assert table == (out / "front.csv").read_text(encoding="utf-8")
 
 
+def test_a_design_is_chosen_from_a_finished_folder_without_a_search(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "arm.toml").write_bytes((EXAMPLES / "arm.toml").read_bytes())
+    problem, out = tmp_path / "design.toml", tmp_path / "out"
+    text = (EXAMPLES / "design.toml").read_text(encoding="utf-8")
+    text = re.sub(r"(?m)^(generations|population) =.*", r"\1 = 8", text)
+    text = text.replace("#[[variables]]", "[[variables]]").replace('#of = "wire"', 'of = "wire"')
+    problem.write_text(text.replace("#choices", "choices"), encoding="utf-8")
+    searched = told("design", problem, "--out", out)
+    front = searched["front"]
+    count = len(front["wire"])
+    assert count > 1
+    other = (searched["chosen"] + 1) % count
+    monkeypatch.setattr(cdsm, "search_designs", None)
+    chosen = told("design", problem, "--out", out, "--choose", other)
+    assert {key: chosen[key] for key in ("designs", "feasible", "front", "chosen")} == {
+        **{key: searched[key] for key in ("designs", "feasible", "front")},
+        "chosen": other,
+    }
+    arm = cdsm.Manipulator.read(out / "arm.toml")
+    assert arm.geometry.hole_radius == front["hole_radius [m]"][other]
+    result = call("design", problem, "--out", out, "--choose", count)
+    assert result.exit_code == 2
+    assert f"the designs 0 to {count - 1}" in " ".join(result.stderr.split())
+    problem.write_text(problem.read_text("utf-8").replace("-4.905", "-4.9"), encoding="utf-8")
+    result = call("design", problem, "--out", out, "--choose", 0)
+    assert result.exit_code == 1
+    assert "holds no designs of this problem" in " ".join(result.stderr.split())
+
+
 def test_reproduce_writes_figures_table_and_numbers(tmp_path: Path) -> None:
     result = call("reproduce", "--out", tmp_path / "new")
     assert result.exit_code == 0, result.output

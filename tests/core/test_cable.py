@@ -71,7 +71,7 @@ def test_bounds_of_a_cable_hold_as_if_they_had_been_asked_for() -> None:
     own = cdsm.distribute_tension(random_posture(arm.with_cables(cables), 0), 12.0)
     assert arm.cables[least].name in asked.at_minimum
     assert asked.at_maximum == (arm.cables[strongest].name,)
-    for name in ("values", "minimum", "maximum"):
+    for name in ("values", "minimum_held", "maximum_held"):
         np.testing.assert_array_equal(getattr(own, name), getattr(asked, name))
 
 
