@@ -1,7 +1,7 @@
 """Plot the recomputed figures of the paper: stiffness against Young's modulus, tension and lead.
 
 Columns of panels are the directions x, y and z, or postures. Rows are two definitions of the tip
-stiffness, the "readings": the paper's K_R, and the stiffness that a hung weight measures. Both are
+stiffness: the paper's K_R, and the stiffness that a hung weight measures. Both are
 computed from EA/L with the stretched length L, as in the paper, and from EA/l_0.
 """
 
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     Row = tuple[str, list[Line]]
 
 _LENGTHS: Final = {"stretched": "$l_0 = L$, as in the paper", "unstrained": "original $l_0$"}
-_READINGS: Final = {"pseudoinverse": "paper's reading\n$K_R$", "along": "hung weight\n$1/C$"}
+_DEFINITIONS: Final = {"pseudoinverse": "paper's definition\n$K_R$", "along": "hung weight\n$1/C$"}
 _NOTE: Final = (
-    "paper's reading: diagonal of $K_R = J^{+T} K_\\theta J^+$; "
+    "paper's definition: diagonal of $K_R = J^{+T} K_\\theta J^+$; "
     "hung weight: $1/(u^T C\\,u)$, what a small weight at the tip measures"
 )
 _SWEPT: Final = {"young_modulus": "Young's modulus [GPa]", "tension": "cable tension, mean [N]"}
@@ -74,7 +74,7 @@ def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
     looks: Any = {"color": style.BLUE, "zorder": 3}, {"color": style.ORANGE, **_WIDE}
     rows: list[Row] = []
     differences: list[Line] = []
-    for (name, reading), dash in zip(_READINGS.items(), ("-", "--"), strict=True):
+    for (name, definition), dash in zip(_DEFINITIONS.items(), ("-", "--"), strict=True):
         lines: list[Line] = []
         for curve, look in zip(result.curves, looks, strict=True):
             x = curve.swept / 1e9
@@ -84,9 +84,9 @@ def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
             differences.append((x, 100.0 * (part / whole - 1.0), {**look, "ls": dash}))
         dots = {**_DOT, "ms": 2.0, "label": "passive part alone"}
         lines.append((x[::4], N_PER_MM * part[::4], dots))
-        name = f"difference, {reading.splitlines()[0]}"
+        name = f"difference, {definition.splitlines()[0]}"
         differences.append((x[:1], np.nan * whole[:1], {"color": "0.2", "ls": dash, "label": name}))
-        rows.append((f"{reading} [N/mm]", lines))
+        rows.append((f"{definition} [N/mm]", lines))
     doubled = N_PER_MM * ratio * result.curves[0].pseudoinverse[:1]
     diamond = {**_DOT, "marker": "D", "mfc": "none", "ms": 6.0}
     label = "paper: proportional, twice at 320 GPa"
@@ -108,18 +108,18 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
     stated = result.claims[0].paper or ()
     looks = {"color": style.BLUE}, {"color": style.VERMILLION, "ls": "--"}
     rows: list[Row] = []
-    for name, reading in _READINGS.items():
+    for name, definition in _DEFINITIONS.items():
         lines = [
             (one.tension[:, 1], N_PER_MM * getattr(one, name), _named(one, look))
             for one, look in zip((curve, original), looks, strict=True)
         ]
-        rows.append((f"{reading} [N/mm]", lines))
+        rows.append((f"{definition} [N/mm]", lines))
     end = N_PER_MM * (1.0 + np.array(stated)) * curve.pseudoinverse[:1]
     times = ", ".join(f"+{change:g}" for change in stated)
     label = f"paper: {times} times the first computed value"
     rows[0][1].append((curve.tension[-1:, 1], end, {**_DOT, "label": label}))
     figure, grid = _multiples(result, 4.4, rows)
-    for name, panels in zip(_READINGS, grid, strict=True):
+    for name, panels in zip(_DEFINITIONS, grid, strict=True):
         _draw_bars(panels, curve, getattr(curve, name))
     for axes in grid.flat:
         axes.set_ylim(bottom=0.0)
@@ -134,7 +134,7 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
     x = first.tension[:, 1]
     active = first.pseudoinverse_part
     rows: list[Row] = [("active part of $K_R$ [N/mm]", [(x, N_PER_MM * active, {})])]
-    for name, reading in _READINGS.items():
+    for name, definition in _DEFINITIONS.items():
         lines: list[Line] = []
         for curves, dash in ((result.curves, "-"), (result.original, "--")):
             for curve, shade in zip(curves, shades, strict=False):
@@ -143,7 +143,7 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
                     curve, {"color": shade, "ls": dash}, f"{curve.label.split(' (')[0]}, "
                 )
                 lines.append((curve.tension[:, 1], 100.0 * (values / values[0] - 1.0), look))
-        rows.append((f"change, {reading} [%]", lines))
+        rows.append((f"change, {definition} [%]", lines))
     stated = np.array([result.claims[0].paper])
     rows[1][1].append((x[-1:], stated, {**_DOT, "label": "paper, at the end"}))
     figure, grid = _multiples(result, 6.2, rows, sharey="row")
@@ -158,7 +158,7 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
     """Plot the change of K_R, and of the stiffness for a hung weight, against the lead."""
     figure, (pair,) = style.panels(style.TWO_COLUMNS, 3.4, 2, sharey=True)
     cases = (result.stretched, "stretched", "-"), (result.original, "unstrained", "--")
-    for row, (axes, reading) in enumerate(zip(pair, _READINGS.values(), strict=True)):
+    for row, (axes, definition) in enumerate(zip(pair, _DEFINITIONS.values(), strict=True)):
         for i, color in enumerate(style.COLORS[:3]):
             for changes, length, dash in cases:
                 label = f"{'xyz'[i]}, {_LENGTHS[length]}"
@@ -168,7 +168,7 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
         axes.set_xlim(0.0, MM * result.leads[-1])
         axes.set_xticks([0, 5, 10, 20, 50, 100, 300], ["0", "5", "10", "20", "50", "100", "300"])
         axes.set_xlabel("lead of all cables [mm]")
-        axes.set_title(reading.replace("\n", ", "))
+        axes.set_title(definition.replace("\n", ", "))
     pair[0].set_ylabel("change of stiffness [%]")
     style.legend_below(figure, pair[0], 3, title=_NOTE)
     return figure
@@ -186,7 +186,7 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
         picture.set_box_aspect(frame_arms(picture), zoom=1.2)
         picture.set_axis_off()
         picture.set_title(curve.label)
-        for row, (name, reading) in enumerate(_READINGS.items(), start=1):
+        for row, (name, definition) in enumerate(_DEFINITIONS.items(), start=1):
             axes: Any = figure.add_subplot(grid[row, column])
             for i, color in enumerate(style.COLORS[:3]):
                 for one, look in ((original, _WIDE), (curve, {"ls": style.STYLES[i]})):
@@ -198,7 +198,7 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
             axes.yaxis.set_major_formatter("{x:g}")
             axes.yaxis.set_minor_locator(NullLocator())
             if column == 0:
-                axes.set_ylabel(f"{reading} [N/mm]")
+                axes.set_ylabel(f"{definition} [N/mm]")
         axes.set_xlabel(_SWEPT[result.swept])
     note = f"{_NOTE}\nthe paper prints no numbers here: a steep rise, then a slight decrease"
     style.legend_below(figure, axes, 3, title=note)  # the last panel: all have the same lines
