@@ -57,7 +57,7 @@ class ArmParameters:
         free = dict[tuple[str, Place], str]()
         for name in self.names:
             parameter = parameter_of(name)
-            if parameter.is_spring and self.arm.own_springs is not None:
+            if parameter.is_spring and self.arm.definition.springs is not None:
                 said = "the springs of the arm are not those of its geometry, which alone is varied"
                 remedy = "Give them by joint_stiffness= of the geometry."
                 raise InvalidInput(name, f"{said}. {remedy}")

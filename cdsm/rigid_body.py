@@ -106,6 +106,11 @@ class RigidBody:
         slides = np.asarray(~self._twists[1:, 3:].any(axis=1))
         self.slides = frozen(slides[list(self.coupling.leaders)] if self.coupling else slides)
 
+    @property
+    def joint_units(self) -> tuple[str, ...]:
+        """Unit of each joint's coordinate (nv,): rad, or m for a prismatic joint."""
+        return tuple("m" if slides else "rad" for slides in self.slides)
+
     def state(self, q: Array) -> State:
         """Compute everything at joint angles q (nv,)."""
         model = self._model

@@ -16,9 +16,8 @@ from typing import Any, Final
 
 from cdsm.arm_file.model import ArmFile, read_model
 from cdsm.cable import SETTINGS, Cable, Site, serpentine_cables
-from cdsm.definition import refuse_terms
+from cdsm.definition import ArmDefinition, refuse_terms
 from cdsm.errors import FileError, GeometryError, InvalidInput
-from cdsm.manipulator import Manipulator
 from cdsm.support.described import attributes_of, in_plain_text
 from cdsm.support.files import write_text
 from cdsm.support.records import one_line_each, toml_text, verbatim
@@ -141,33 +140,32 @@ _ESCAPED = re.compile(r"'''|'$|[^\t\n -~\x80-\U0010ffff]")  # what a literal str
 
 def read_arm(
     path: str | os.PathLike[str], wire: Wire | None, changes: Mapping[str, Any] | None
-) -> dict[str, Any]:
+) -> ArmDefinition:
     """Read what defines an arm. Arguments and errors are those of :meth:`cdsm.Manipulator.read`."""
     file, cables = read_model(path, wire, changes, robot=True)
-    arm = {"cables": cables, "geometry": file.geometry}
-    arm |= {key: getattr(file, key) for key in _KEYS}
+    values: Any = {"cables": cables, "geometry": file.geometry}
+    values |= {key: getattr(file, key) for key in _KEYS}
     if (robot := file.urdf) is None:
-        return {**arm, "urdf": to_urdf(file.geometry), "tip_link": TIP}
+        return ArmDefinition(urdf=to_urdf(file.geometry), tip_link=TIP, **values)
     source = robot.text if robot.file is None else Path(path).parent / robot.file
     assert source is not None
     try:
         urdf = read_urdf(source, check_inertia=robot.check_inertia)
     except FileError as error:
         raise FileError(path, f"urdf.file: {error}") from None
-    return {**arm, "urdf": urdf, "tip_link": robot.tip, "joint_names": robot.joint_names}
+    return ArmDefinition(urdf=urdf, tip_link=robot.tip, joint_names=robot.joint_names, **values)
 
 
-def arm_text(arm: Manipulator) -> str:
+def arm_text(arm: ArmDefinition) -> str:
     """Return the text of an ARM.toml; InvalidInput if a wire or a term cannot be written."""
-    refuse_terms(arm.extra_terms, "ARM.toml has no key for the terms", "terms")
+    refuse_terms(arm.terms, "ARM.toml has no key for the terms", "terms")
     cables = arm.cables
-    geometry = arm.geometry if arm.is_serpentine else None
+    geometry = arm.geometry
     values, tables = _wire_tables(cables)
     owns = [{"wire": values[each.elasticity]} | _settings(each) for each in cables]
     shared = {key: x for key, x in owns[0].items() if all(own.get(key) == x for own in owns)}
     owns = [{key: x for key, x in own.items() if key not in shared} for own in owns]
-    definition = arm.__getstate__()
-    data = {key: _TABLES.get(key, _as_it_is)(definition[key]) for key in _KEYS}
+    data = {key: _TABLES.get(key, _as_it_is)(getattr(arm, key)) for key in _KEYS}
     data |= shared | {"wires": tables}
     plain: tuple[Cable, ...] = ()
     if geometry is None:
@@ -183,7 +181,7 @@ def arm_text(arm: Manipulator) -> str:
     return _ARM_HEAD + toml_text(data)
 
 
-def _urdf_table(arm: Manipulator) -> dict[str, Any]:
+def _urdf_table(arm: ArmDefinition) -> dict[str, Any]:
     """Return the table [urdf], with the text of the URDF unescaped ('''…''') if possible."""
     text = arm.urdf if _ESCAPED.search(arm.urdf) else verbatim(f"'''\n{arm.urdf}'''")
     table = {"tip": arm.tip_link, "joint_names": arm.joint_names, "text": text}

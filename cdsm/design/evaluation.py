@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.design.problem import MISSED, DesignProblem
 from cdsm.design.quantities import Measured, measure, quiet_arm
 from cdsm.errors import CdsmError, FileError, unknown
-from cdsm.manipulator import UNCHECKED
+from cdsm.limits import UNCHECKED
 from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
 from cdsm.stiffness_matrix.prints import verdict

@@ -75,7 +75,7 @@ class DesignProblem(ReadOnlyState):
 
     def __post_init__(self) -> None:
         geometry = instance("arm", self.arm, Manipulator).geometry  # raises without one
-        refuse_terms(self.arm.extra_terms, "batches, and so designs, have no kernel for")
+        refuse_terms(self.arm.definition.terms, "batches, and so designs, have no kernel for")
         require_own_cables(geometry, self.arm.cables)
         variables = sequence_of("variables", self.variables, Variable)
         objectives = sequence_of("objectives", self.objectives, Objective)

@@ -149,9 +149,8 @@ def mujoco_model(
     damping: float | None = None,
 ) -> MuJoCoModel:
     """Build the MJCF text of :func:`to_mjcf`, with its settings; the arguments are the same."""
-    refuse_terms(
-        instance("arm", arm, Manipulator).extra_terms, "a MuJoCo model has no element for its terms"
-    )
+    further = instance("arm", arm, Manipulator).definition.terms
+    refuse_terms(further, "a MuJoCo model has no element for its terms")
     if (pose is None) != (tension is None):
         raise InvalidInput("tension", "give pose and tension, or neither.")
     if pose is not None and instance("pose", pose, Posture).arm != arm:

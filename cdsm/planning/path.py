@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.kinematics import inverse_kinematics
-from cdsm.manipulator import UNCHECKED, Manipulator
+from cdsm.limits import UNCHECKED
+from cdsm.manipulator import Manipulator
 from cdsm.planning.goal import Goal
 from cdsm.planning.path_plan import InfeasibleSample, PathPlan
 from cdsm.planning.plan import achieved, checked_targets, per_sample

@@ -289,7 +289,7 @@ def equilibrium(
     """
     K = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
     W = K.wrench if wrench is None else wrench_vector("wrench", wrench)
-    pose.arm._angles(pose.q, True)  # within the joint limits
+    pose.arm.checked_angles(pose.q)  # within the joint limits
     arm = LockedArm(pose, K.tension, W)
     return as_equilibrium(arm, settled(arm, pose))
 

@@ -70,7 +70,7 @@ class QuasiStaticArm:
 
     def __init__(self, reference: Posture, tension: Array) -> None:
         arm = reference.arm
-        arm._angles(reference.q, True)  # within the joint limits
+        arm.checked_angles(reference.q)  # within the joint limits
         LockedArm(reference, tension, np.zeros(6))  # refuses a spring that leaves no wire
         self.reference = reference
         self._tension = tension

@@ -48,7 +48,7 @@ def readings(K: Stiffness) -> dict[str, object]:
 def _further_terms(K: Stiffness) -> dict[str, object]:
     """Return the terms of K_θ that only this arm has."""
     unit = K.posture.arm.stiffness_unit()
-    return {key(term.name, unit): K.terms[term.name] for term in K.posture.arm.extra_terms}
+    return {key(term.name, unit): K.terms[term.name] for term in K.posture.arm.definition.terms}
 
 
 def _existing(read: Callable[[], object]) -> object:

@@ -141,9 +141,9 @@ class Labelled(Cases):
         from cdsm.arm_file.arm import arm_text  # pydantic: slow to import
 
         try:
-            arm = arm_text(self.arm)
+            arm = arm_text(self.arm.definition)
         except InvalidInput:  # laws made from functions cannot be written
-            arm = f"{self.arm.__getstate__() | {'cables': [*self.arm.cables]}}"
+            arm = f"{vars(self.arm.definition) | {'cables': [*self.arm.cables]}}"
         about = {"Conventions": "CF-1.11", "title": f"stiffness sweep of {self.arm.name}"}
         about |= {"source": f"cdsm {version('cdsm-stiffness')}", "arm": arm}
         about["model"] = frictionless_model(self.arm)

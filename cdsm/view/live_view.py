@@ -89,7 +89,7 @@ def serve(
     path = None if angles is None and tips is None else checked_path(arm, angles, tips)
     route = path if path is None or tips is not None else _tips(arm, path)
     start = Setting(
-        q=arm._angles(straight if q is None else q, check_limits=True),
+        q=arm.checked_angles(straight if q is None else q),
         minimum=checked_quantity("minimum", minimum, "tension", zero=True),
         maximum=checked_quantity("maximum", maximum, "tension", infinite=True),
         force=vector("force", force, 3, "force at the tip [N], base axes"),
