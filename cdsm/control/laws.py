@@ -208,6 +208,16 @@ def reference_at(arm: Manipulator, q: Array, tension: Array) -> Reference:
     return Reference(q, tension, wire, k)
 
 
+class Replanned(NamedTuple):
+    """References of one step of control, as the outer loop plans them."""
+
+    reference: Reference
+    reference_before: Reference  # that of the previous step, with the wire as calibrated now
+    saturated: NDArray[np.bool_]  # whether the tension of each motor was kept at a bound (C,)
+    target_unreachable: bool = False
+    change_limited: bool = False
+
+
 class StiffnessLoop:
     """Planner of the least tensions that give the target stiffness at the posture to come.
 
@@ -229,12 +239,11 @@ class StiffnessLoop:
 
     def next(
         self, wanted: Reference, target: Array, estimate: Estimate, before: Reference
-    ) -> tuple[Reference, Reference, dict[str, bool]]:
+    ) -> Replanned:
         """Plan the tensions of the next step, for the stiffness ``target`` (D,) [N/m].
 
         The posture to come is that of ``wanted``, moved by the estimated distance of the arm from
-        the reference ``before``. Return the reference, the one before with the wire as calibrated
-        now, and the values of ``target_unreachable`` and ``change_limited``.
+        the reference ``before``.
         """
         ratio = estimate.ratio
         last = self._mean
@@ -243,6 +252,7 @@ class StiffnessLoop:
         try:
             self._calibrate(estimate.softness)
             moved = wanted.angles + (estimate.pose.q - before.angles)
+            # no arm is beyond its limits: there the estimate is wrong, and the limit is nearest
             pose = self._arm.at(np.clip(moved, self._arm.lower, self._arm.upper))
             wrench = np.append(estimate.force, np.zeros(3))
             F, reached = self._least(pose, target, self._low * ratio, self._high * ratio, wrench)
@@ -253,10 +263,12 @@ class StiffnessLoop:
         except CdsmError as error:
             self.failed[self._steps] = str(error)
         self._steps += 1
-        motor = np.clip(self._mean / ratio, self._low, self._high)
+        wanted_at_motor = self._mean / ratio
+        motor = np.clip(wanted_at_motor, self._low, self._high)
+        saturated = abs(wanted_at_motor - motor) > _ROUNDING
         now = reference_at(self._arm, wanted.angles, self._mean)._replace(tension=motor)
         then = reference_at(self._arm, before.angles, last)._replace(tension=before.tension)
-        return now, then, {"target_unreachable": unreachable, "change_limited": limited}
+        return Replanned(now, then, saturated, unreachable, limited)
 
     def _least(
         self, pose: Posture, target: Array, low: Array, high: Array, wrench: Array

@@ -46,6 +46,7 @@ class TrackingRun(Result, Plotted):
         max_change_per_step: Largest change of each tension that the outer loop plans (C,) [N].
         reference_tips: Planned tip positions (n, 3) [m].
         target: Wanted stiffness (n, D) [N/m].
+        reference_balanced: Whether the tensions of the plan balance the arm at each step (n,).
         angles: True joint angles (n, nv) [rad]; [m] for prismatic joints.
         estimated_angles: Angles that the controller estimated before each step (n, nv) [rad].
         tips: True tip positions (n, 3) [m].
@@ -91,6 +92,7 @@ class TrackingRun(Result, Plotted):
     max_change_per_step: Array = field(metadata=unit("N", "cable"))
     reference_tips: Array = field(metadata=unit("m", "time", "axis"))
     target: Array = field(metadata=unit("N/m", "time", "direction"))
+    reference_balanced: NDArray[np.bool_] = field(metadata=unit("1", "time"))
     angles: Array = field(metadata=unit("joint", "time", "joint"))
     estimated_angles: Array = field(metadata=unit("joint", "time", "joint"))
     tips: Array = field(metadata=unit("m", "time", "axis"))
@@ -160,6 +162,11 @@ class TrackingRun(Result, Plotted):
             said.append(f"{self.outcome.title} at {end:.4g} s: {self.reason}")
         if unstable := np.flatnonzero(~(self.margin > 0.0)).tolist():
             said.append(f"UNSTABLE {self._at(unstable)}: without friction the arm would buckle")
+        if unbalanced := np.flatnonzero(~self.reference_balanced).tolist():
+            said.append(
+                f"OUT OF BALANCE {self._at(unbalanced)}: between samples of the plan no tensions "
+                "within the domains of the laws balance the arm; give the path more samples"
+            )
         if failed := sorted(self.replan_failed):
             said.append(f"NOT PLANNED {self._at(failed)}: {self.replan_failed[failed[0]]}")
         if unreachable := np.flatnonzero(self.target_unreachable).tolist():

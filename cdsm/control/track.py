@@ -16,6 +16,7 @@ from cdsm.control.laws import (
     ControlInput,
     Law,
     Reference,
+    Replanned,
     StiffnessLoop,
     checked_command,
     reference_at,
@@ -39,6 +40,8 @@ from cdsm.support.progress import show_progress
 from cdsm.support.validation import checked_quantity, instance, one_of, whole_number
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
+from cdsm.tension.least_tensions import nearest_balanced
+from cdsm.tension.solvers import nondimensional
 from cdsm.terms import required_torque
 
 _MOST_STEPS: Final = 1000  # largest number of steps of control between two samples
@@ -71,8 +74,9 @@ def track(
 
     The plan's arm, with its friction, is the model of the controller. The loop starts at rest at
     the first sample with the planned tensions. Between two samples the joint angles change evenly,
-    and the tensions balance the arm. If plant and plan are the same arm and the sensors are exact,
-    every law holds the plan at the samples; ``"stiffness"``, which takes all loads for forces at
+    and the tensions balance the arm; where none within the domains of the laws do, ``warnings`` of
+    the result says so. If plant and plan are the same arm and the sensors are exact, every law
+    holds the plan at the samples; ``"stiffness"``, which takes all loads for forces at
     the tip, only if the plan has no moment. An unstable loop, an arm that buckles and a target that
     cannot be planned or reached raise no error: ``outcome``, ``reason`` and ``warnings`` of the
     result report them.
@@ -168,9 +172,11 @@ def _follow(
         estimate = observer.update(estimate, measured)
         reference = wanted.reference
         before = last
-        flags = {"target_unreachable": False, "change_limited": False}
+        replanned = Replanned(reference, last, np.zeros(error.size, dtype=np.bool_))
         if outer is not None:
-            reference, before, flags = outer.next(reference, wanted.target, estimate, last)
+            replanned = outer.next(reference, wanted.target, estimate, last)
+        reference = replanned.reference
+        before = replanned.reference_before
         given = ControlInput(reference, before, measured, error, paid_out, *bounds, forced)
         command = checked_command(law(given), given, plan.arm.cables.names)
         try:
@@ -186,6 +192,7 @@ def _follow(
             {
                 "reference_tips": wanted.tip,
                 "target": wanted.target,
+                "reference_balanced": wanted.balanced,
                 "wrench": wanted.wrench,
                 "states": state,
                 "angles": state.pose.q,
@@ -198,8 +205,9 @@ def _follow(
                 "measured_tension": measured.tension,
                 "commanded_tension": command.tension,
                 "paid_out": command.paid_out,
-                "saturated": command.saturated,
-                **flags,
+                "saturated": command.saturated | replanned.saturated,
+                "target_unreachable": replanned.target_unreachable,
+                "change_limited": replanned.change_limited,
                 **_assessed(state, wanted.wrench, plan.direction.reshape(-1, 3)),
             }
         )
@@ -216,6 +224,7 @@ class _Wanted(NamedTuple):
     target: Array  # stiffness (D,) [N/m]
     tip: Array  # position (3,) [m]
     wrench: Array  # true load (6,): force [N], then moment [N m]
+    balanced: bool  # whether the tensions of the reference balance the arm
 
 
 def _schedule(plan: PathPlan, steps: int, hung: Array) -> list[_Wanted]:
@@ -226,8 +235,6 @@ def _schedule(plan: PathPlan, steps: int, hung: Array) -> list[_Wanted]:
     arm = plan.arm
     size = len(plan.planned)
     at = np.linspace(0.0, size - 1.0, (size - 1) * steps + 1)
-    laws = [cable.elasticity for cable in arm.cables]
-    domains = [law.low for law in laws], [law.high for law in laws]
 
     def along(values: Any) -> Array:
         rows = np.reshape(values, (size, -1)).T
@@ -238,13 +245,32 @@ def _schedule(plan: PathPlan, steps: int, hung: Array) -> list[_Wanted]:
     parts = plan.angles, plan.tensions, plan.target, loads
     for q, F, target, W in zip(*map(along, parts), strict=True):
         pose = arm.at(q)
-        missing = required_torque(pose, W) - F @ pose.length_jacobian
-        F = np.clip(F + np.linalg.lstsq(pose.length_jacobian.T, missing)[0], *domains)
-        reference = reference_at(arm, q, F)
+        tension, balanced = _balanced_near(pose, F, W)
+        reference = reference_at(arm, q, tension)
         late = 2 * len(wanted) >= len(at) - 1
         true_load = W + late * np.append(hung, np.zeros(3))
-        wanted.append(_Wanted(reference, target, pose.tip[:3, 3], true_load))
+        wanted.append(_Wanted(reference, target, pose.tip[:3, 3], true_load, balanced))
     return wanted
+
+
+def _balanced_near(pose: Posture, F: Array, wrench: Array) -> tuple[Array, bool]:
+    """Return tensions (C,) [N] near F within the domains of the laws; do they balance the arm?
+
+    They are the nearest in balance, or, if none within the domains are, the nearest within these.
+    """
+    torque = required_torque(pose, wrench)
+    J = pose.length_jacobian
+    near = F + np.linalg.lstsq(J.T, torque - F @ J)[0]
+    held = pose.arm.cables.position_controlled
+    laws = [cable.elasticity for cable in pose.arm.cables]
+    low = np.where(held, [law.low for law in laws], 0.0)
+    high = np.where(held, [law.high for law in laws], math.inf)
+    inside = np.clip(near, low, high)
+    if (inside == near).all():
+        return inside, True
+    problem = nondimensional(J, torque, low, high, pose.arm.length)
+    solution = nearest_balanced(problem, near, low, high)
+    return (solution.x, True) if solution.ok else (inside, False)
 
 
 def _tension_controlled(pose: Posture) -> NDArray[np.bool_]:

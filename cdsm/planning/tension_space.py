@@ -34,7 +34,8 @@ from cdsm.tension import (
     least_tension,
     too_few_cables,
 )
-from cdsm.tension.solvers import DEFAULT_SOLVER, Problem, nondimensional, solve, without_warnings
+from cdsm.tension.least_tensions import nearest_balanced
+from cdsm.tension.solvers import nondimensional, without_warnings
 from cdsm.terms import CABLE_TERMS, required_torque, total
 
 MARGIN: Final = 1e-2
@@ -136,11 +137,8 @@ class TensionSpace:
 
     def nearest(self, F: Array, bounds: Bounds | None = None) -> Array | None:
         """Return the balanced tensions (C,) [N] nearest to F within the bounds, if any."""
-        A, b, *_, arm, force = self._balance
-        low, high = bounds or self.bounds
-        sides = b - A @ (F / force), (low - F) / force, (high - F) / force
-        change = solve(Problem(A, *sides, arm, force), DEFAULT_SOLVER)
-        return np.clip(F + force * change.x, low, high) if change.ok else None
+        solution = nearest_balanced(self._balance, F, *(bounds or self.bounds))
+        return solution.x if solution.ok else None
 
     def tension(self, F: Array) -> Tension:
         """Return F (C,) [N] as a :class:`Tension`."""

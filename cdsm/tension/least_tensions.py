@@ -6,6 +6,7 @@ the others.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from cdsm.status import Status
 from cdsm.support.values import Array
 from cdsm.tension.solvers import (
+    DEFAULT_SOLVER,
     HINT,
     OPTIMALITY,
     Problem,
@@ -52,6 +54,19 @@ def least_tensions(problem: Problem, solver: str, *, proof_first: bool = False) 
     exists = f"{solution.message}, though one exists with tensions of up to {most}"
     edge = f"{exists}: the problem is nearly infeasible. {HINT}"
     return no_solution(count, Status.SOLVER_FAILED, edge)
+
+
+def nearest_balanced(
+    problem: Problem, F: Array, low: Array, high: Array, solver: str = DEFAULT_SOLVER
+) -> Solution:
+    """Return the tensions (C,) [N] in balance that are nearest to F (C,) [N].
+
+    ``low`` and ``high`` (C,) [N] are their bounds; those of ``problem`` do not count.
+    """
+    A, b, *_, arm, force = problem
+    shifted = Problem(A, b - A @ (F / force), (low - F) / force, (high - F) / force, arm, force)
+    change = solve(shifted, solver)
+    return replace(change, x=np.clip(F + force * change.x, low, high))
 
 
 def missing_torque(problem: Problem, F: Array) -> float:

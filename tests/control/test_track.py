@@ -1,5 +1,6 @@
 """The closed loop: what it holds, what it survives, and what it says when it fails."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -192,3 +193,20 @@ def test_stiffness_loop_holds_four_newtons_per_millimetre_within_five_percent() 
     assert worst["stiffness"] < 0.05
     assert worst["feedforward"] > 0.7
     assert worst["tension"] > 0.1
+
+
+def test_references_balance_the_arm_where_its_wire_is_near_the_end_of_its_law() -> None:
+    """Clipped into the law of Eq. 19, which begins at 2.2 N, they missed 0.066 N m."""
+    arm = small_path().arm
+    ends = np.array([[0.299, -0.022, 0.33, 0.213], [0.332, -0.298, -0.341, -0.344]])
+    softest = [cdsm.stiffness_range(arm.at(q), "z", 2.2, 250.0, starts=2).low for q in ends]
+    plan = cdsm.plan_path(arm, "z", 1.001 * np.array(softest), 2.2, 250.0, angles=ends)
+    run = cdsm.track(plan, "feedforward", steps=5, minimum=2.2, maximum=250.0)
+    assert run.reference_balanced.all()
+    assert not any("OUT OF BALANCE" in warning for warning in run.warnings)
+    for part, F in zip(np.linspace(0.0, 1.0, 6), run.reference_tension, strict=False):
+        pose = arm.at(ends[0] + part * (ends[1] - ends[0]))
+        assert abs(F @ pose.length_jacobian + pose.gravity_torque).max() < 1e-12
+        assert F.min() >= arm.cables[0].elasticity.low
+    astray = replace(run, reference_balanced=np.zeros_like(run.reference_balanced))
+    assert any("OUT OF BALANCE" in warning for warning in astray.warnings)
