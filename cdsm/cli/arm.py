@@ -205,7 +205,7 @@ def view(
 ) -> int:
     """Show an arm in the browser, with sliders, and its stiffness."""
     with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the view, also while it starts
-        robot = options.read_arm(arm, changes)
+        robot = options.load_arm(arm, changes)
         start = None if angles is None else options.joint_coordinates(angles, robot)
         force = options.load_at_tip(robot, load)
         if force[3:].any():

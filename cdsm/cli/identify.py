@@ -69,7 +69,7 @@ def _pair(option: str, text: str | None) -> list[str] | None:
     return entries
 
 
-Bounds = tuple[float, float]
+Limits = tuple[float, float]
 
 _LOOPS = "A line per reading. Columns: test; joints [deg]; direction (such as -z); force [N]; "
 _LOOPS += "displacement [mm] along it (or x, y, z); minimum [N], or a tension per cable [N]."
@@ -100,7 +100,7 @@ def identify_parameters(
     from cdsm.arm_parameters import ArmParameters
     from cdsm.identification.experiment_plan import plan_tests
 
-    described = options.read_arm(arm, changes)
+    described = options.load_arm(arm, changes)
     ranges = _ranges(free)
     for name in ranges:
         if name.partition("@")[0] in ("slack", "gain"):
@@ -136,9 +136,9 @@ def identify_parameters(
     )
 
 
-def _ranges(free: list[str]) -> dict[str, Bounds | None]:
+def _ranges(free: list[str]) -> dict[str, Limits | None]:
     """Return the bounds of each parameter of --free, by name and in its unit; None: the usual."""
-    ranges: dict[str, Bounds | None] = {}
+    ranges: dict[str, Limits | None] = {}
     for entry in free:
         name, equals, limits = entry.partition("=")
         if name in ranges:
@@ -153,7 +153,7 @@ def _ranges(free: list[str]) -> dict[str, Bounds | None]:
     return ranges
 
 
-def _usual(name: str, value: float) -> Bounds:
+def _usual(name: str, value: float) -> Limits:
     """Return the default bounds of a parameter of this value: friction 0 to 1, else ½ to twice."""
     if name.partition("@")[0] == "friction":
         return 0.0, 1.0

@@ -98,14 +98,14 @@ def changes_of(texts: Iterable[str] | None) -> dict[str, Any]:
     return changes
 
 
-def read_arm(arm: Path, changes: Iterable[str] | None) -> cdsm.Manipulator:
+def load_arm(arm: Path, changes: Iterable[str] | None) -> cdsm.Manipulator:
     """Read an arm, with the changes of --set."""
     return cdsm.Manipulator.read(arm, changes=changes_of(changes))
 
 
 def posture(arm: Path, changes: Iterable[str] | None, angles: str | None) -> cdsm.Posture:
     """Read an arm and return its posture at --angles."""
-    robot = read_arm(arm, changes)
+    robot = load_arm(arm, changes)
     return robot.at(joint_coordinates(angles, robot))
 
 

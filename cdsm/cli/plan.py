@@ -71,7 +71,7 @@ def plan(
 
     if angles is not None:
         raise misuse("--angles", "is of one posture; --path has its own.")
-    robot = options.read_arm(arm, changes)
+    robot = options.load_arm(arm, changes)
     file = options.read_path(path, robot)
     planned = cdsm.plan_path(
         robot,
@@ -140,7 +140,7 @@ def sweep_postures(
     from cdsm.sweeps.dataset import read_into_memory
     from cdsm.sweeps.sweep import write_sweep
 
-    robot = options.read_arm(arm, changes)
+    robot = options.load_arm(arm, changes)
     low = options.parse_numbers("--minimum", minimum)
     names = [*DEFAULT] if outputs is None else [name.strip() for name in outputs.split(",")]
     if figure is not None:

@@ -53,7 +53,7 @@ def show_stiffness(
     """
     from cdsm.support.files import write_text
 
-    robot = options.read_arm(arm, changes)
+    robot = options.load_arm(arm, changes)
     wrench = options.load_at_tip(robot, load, mass)
     K, rest = _balanced(robot, wrench, angles, minimum, maximum, tension, pull)
     head, numbers = header(K.posture, [] if rest else [minimum], tension=K.distribution)
@@ -198,7 +198,7 @@ def weigh(
     """
     if out is not None and cycles is None:
         raise misuse("--out", "is the table of --cycles; give both.")
-    robot = options.read_arm(arm, changes)
+    robot = options.load_arm(arm, changes)
     weight = _weight(robot, load, mass)
     K, rest = _balanced(robot, [0.0] * 6, angles, minimum, maximum, tension, pull)
     pose = K.posture

@@ -24,7 +24,8 @@ from cdsm.identification.least_squares import LeastSquares
 from cdsm.support.values import Array, frozen
 
 _LOWER = 1e-2  # fall of χ² below that of the best fit that refutes it
-_TRIALS, _EDGE = 20, 1e-2  # on the way outward; distance from the model's end, in half widths
+_TRIALS = 20  # steps outward from the optimum
+_EDGE = 1e-2  # distance from the end of the model, in half widths
 _TOLERANCE = 1e-6  # smaller singular values of J, its columns scaled to length 1, are zero
 
 

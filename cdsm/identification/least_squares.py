@@ -29,7 +29,8 @@ TensionOf = Callable[..., Tension | ArrayLike]
 Test = Measurement | WeightLoop | TipPosition
 
 _DECADES = 100.0  # bounds that are positive and this factor apart: the logarithm is searched
-_STEP, _STEP_OF_RESTS = 1e-6, 1e-5  # of finite differences; postures at rest are less exact
+_STEP = 1e-6  # of finite differences
+_STEP_OF_RESTS = 1e-5  # the same of postures at rest, which are less exact
 _FALL = (1e-12, 1e-6), (1e-6, 1e-5)  # of χ², at which a search ends: fine, coarse; with loops
 _INSIDE = 1e-2  # nearest start to a bound: a search that starts on a bound may stay there
 

@@ -138,7 +138,8 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
     error.plot(t, MM * run.tip_error)
     error.set(ylabel="tip error [mm]")
     for k, u in enumerate(run.directions):
-        color, label = style.COLORS[k % 7], f"along {style.direction_name(u)}; dashed: wanted"
+        color = style.COLORS[k % 7]
+        label = f"along {style.direction_name(u)}; dashed: wanted"
         stiffness.plot(t, target[:, k], "--", color=color, linewidth=0.9)
         stiffness.plot(t, achieved[:, k], color=color, label=label)
     stiffness.set(ylabel="frictionless\nstiffness [N/mm]")

@@ -29,9 +29,14 @@ ONE_COLUMN: Final = 3.5
 TWO_COLUMNS: Final = 7.16
 """Widths [inch] of figures as wide as one and two columns of an IEEE journal."""
 
-BLUE, VERMILLION, GREEN, ORANGE, SKY, PURPLE, BLACK = COLORS = (
-    *("#0072b2", "#d55e00", "#009e73", "#e69f00", "#56b4e9", "#cc79a7", "#000000"),
-)
+BLUE: Final = "#0072b2"
+VERMILLION: Final = "#d55e00"
+GREEN: Final = "#009e73"
+ORANGE: Final = "#e69f00"
+SKY: Final = "#56b4e9"
+PURPLE: Final = "#cc79a7"
+BLACK: Final = "#000000"
+COLORS: Final = (BLUE, VERMILLION, GREEN, ORANGE, SKY, PURPLE, BLACK)
 """Colours of Okabe and Ito, "Color universal design", 2008; the first three are x, y and z."""
 
 STYLES: Final = ("-", "--", "-.", ":")

@@ -27,7 +27,7 @@ _T = TypeVar("_T")
 
 AXIS_NAMES = ("x", "y", "z")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
-MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
+MOTION_NAMES = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def unit(unit: str, *dims: str, name: str = "") -> Mapping[str, Any]:
@@ -239,7 +239,7 @@ class Result(ReadOnlyState):
     def _labels(self) -> dict[str, Sequence[object]]:
         """Return the names along each dimension that has names."""
         labels: dict[str, Sequence[object]] = {"axis": AXIS_NAMES, "component": COMPONENTS}
-        labels |= {"axis_column": AXIS_NAMES, "motion": MOTIONS, "motion_column": MOTIONS}
+        labels |= {"axis_column": AXIS_NAMES, "motion": MOTION_NAMES, "motion_column": MOTION_NAMES}
         if self._arm:
             joints = self._arm.joint_names
             cables = self._arm.cables

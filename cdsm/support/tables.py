@@ -124,7 +124,8 @@ class Columns:
             as_long = [column for column in units if abs(len(column) - len(name)) < 2]
             hint = did_you_mean(name, as_long, least=0.8)
             if name in units:
-                self._at[name], self.unit[name] = at, unit
+                self._at[name] = at
+                self.unit[name] = unit
             elif hint or (unit in ANGLE and name.rpartition(" ")[2] not in units):
                 hint = f"{hint} There" if hint else "; there"
                 self.refuse(f"has a column {name}, which is not known{hint} are {listed([*units])}")

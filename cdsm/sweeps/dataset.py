@@ -20,7 +20,7 @@ from cdsm.status import ENTRY_STATUSES
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import JointUnits
 from cdsm.support.progress import progress_bar
-from cdsm.support.result import MOTIONS
+from cdsm.support.result import MOTION_NAMES
 from cdsm.support.validation import XYZ
 from cdsm.support.values import Array
 from cdsm.sweeps.cases import CASES, Cases
@@ -117,7 +117,7 @@ class Labelled(Cases):
                 coordinates[name] = (of, values, {"long_name": long_name, "units": units})
         labels: dict[str, Sequence[object] | None] = {"cable": self.arm.cables.names, **self.names}
         labels |= dict.fromkeys(("axis", "axis_column"), XYZ)
-        labels |= dict.fromkeys(("motion", "motion_column"), MOTIONS)
+        labels |= dict.fromkeys(("motion", "motion_column"), MOTION_NAMES)
         labels |= dict.fromkeys(("joint", "joint_column"), self.arm.joint_names)
         for dim, names in labels.items():
             if dim in used - coordinates.keys() and names is not None:
