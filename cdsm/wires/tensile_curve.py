@@ -28,6 +28,8 @@ _SPLINES = 36  # splines, tensions of the grid, points (more are averaged)
 _GRID = 600
 _MOST = 400
 _JUMP = 10.0  # EA over the steepest measured chord; beyond it, the curve has overshot a jump
+_PARTS = 6  # part of the points over which their scatter is averaged
+_FEWEST_NEAR = 20  # fewest points of such an average
 _ROUGHER = 100.0  # smoothing of the fit over that of the curve for the band
 
 
@@ -127,7 +129,7 @@ class Curve(NamedTuple):
     strain: Array  # (g,) [-]
     level: Array  # ln EA (g,)
     rough: Array  # ln EA of a rougher curve, whose bias is far below its scatter (g,)
-    deviation: Array  # standard deviation of ``rough`` (g,)
+    deviation: Array  # root of variance and squared bias of ``rough`` (g,)
     correlation: float  # of neighbouring residuals
 
 
@@ -144,6 +146,22 @@ def _grid(force: Array, noise: float) -> tuple[Array, Array]:
     knots = np.arange(-3, splines + 1) / (splines - 3)
     rows = BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3).toarray()
     return np.interp(t, place, fine), rows
+
+
+def _local_squares(error: Array, strain: Array) -> Array:
+    """Return the mean square of the errors (n,) near each strain.
+
+    Noise of the displacement counts as EA times as much force: it is larger where EA is.
+    """
+    order = np.argsort(strain, kind="stable")
+    half = max(len(error) // _PARTS, _FEWEST_NEAR) // 2
+    total = np.concatenate([[0.0], np.cumsum(error[order] ** 2)])
+    places = np.arange(len(error))
+    first = np.clip(places - half, 0, None)
+    last = np.clip(places + half + 1, None, len(error))
+    squares = np.empty_like(error)
+    squares[order] = (total[last] - total[first]) / (last - first)
+    return squares
 
 
 def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
@@ -187,9 +205,13 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
         s = np.clip((strain - grid[i]) / (grid[i + 1] - grid[i]), 0.0, 1.0)[:, None]
         return np.asarray(weight[:, None] * ((1.0 - s) * rows[i] + s * rows[i + 1]))
 
+    def penalty(power: float) -> Array:
+        """Return the root of the penalty S for a smoothing of 10^power units."""
+        return np.asarray(max(noise, 1e-4 * reach) * 10.0 ** (power / 2.0) * bends)
+
     def solve(power: float, x: Array) -> tuple[Array, float, Array]:
-        """Return parameters, −2 log likelihood and covariance for a smoothing of 10^power units."""
-        root = max(noise, 1e-4 * reach) * 10.0 ** (power / 2.0) * bends
+        """Return parameters, −2 log likelihood and (JᵀJ + S)⁻¹ for a smoothing of 10^power units."""
+        root = penalty(power)
         x = least_squares(
             lambda x: np.append(error(x), root @ x),
             x,
@@ -208,8 +230,7 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
         left = r @ r + n * (1e-6 * reach) ** 2
         score = (n - 3) * np.log(left + np.sum((root @ x) ** 2))
         score += 2.0 * np.log(np.diag(factor[0]) * scale).sum() - (k - 2) * np.log(10.0) * power
-        variance = left / max(n - np.sum((J @ inverse) * J), 1.0)
-        return x, float(score), variance * inverse
+        return x, float(score), inverse
 
     x = np.append(np.full(k, start), strain.max() / span)
     scores = {}
@@ -220,8 +241,15 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
     around = {"bounds": (power - 2, power + 2), "method": "bounded", "options": {"xatol": 0.2}}
     best = minimize_scalar(lambda p: solve(p, x)[1], **around).x
     x = solve(best, x)[0]
-    rough, _, covariance = solve(best - np.log10(_ROUGHER), x)
+    rougher = best - np.log10(_ROUGHER)
+    rough, _, inverse = solve(rougher, x)
+    root = penalty(rougher)
+    J = slope(rough)
+    freedom = max(n - float(np.sum((J @ inverse) * J)), 1.0)
+    local = _local_squares(error(rough), strain) * n / freedom
+    covariance = inverse @ (J.T * local) @ J @ inverse
     variance = np.sum((splines @ covariance[:-1, :-1]) * splines, axis=1)
+    bias = splines @ (inverse @ (root.T @ (root @ x)))[:-1]
     (EA, grid) = curve(x)
     r = error(x)
     order = np.argsort(strain, kind="stable")
@@ -236,4 +264,4 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
     if np.std(r) < 1e-4 * reach:  # what is left is no noise
         correlation = 0.0
     level = splines @ rough[:-1]
-    return Curve(tension, grid, np.log(EA), level, np.sqrt(variance), correlation)
+    return Curve(tension, grid, np.log(EA), level, np.sqrt(variance + bias**2), correlation)

@@ -38,10 +38,12 @@ class Stage(NamedTuple):
 class Band(NamedTuple):
     """95 % confidence band of EA(F), from the scatter of the points of a test.
 
-    It is exp(m ± 1.96 s), with ln EA = m of a curve that is rougher than the fitted one, and its
-    Bayesian standard deviation s (G. Wahba, J. R. Stat. Soc. B 45 (1983) 133), widened to contain
-    the fit. It holds at each tension for itself, and misses EA within some newtons of a kink. It
-    ignores errors of calibration and gauge length, and drift.
+    It is exp(m ± 1.96 s), with ln EA = m of a curve that is rougher than the fitted one, widened to
+    contain the fit. s² is the variance of m, from the scatter of the points near each strain, plus
+    the square of its bias by the smoothing, (JᵀJ + S)⁻¹ S x with the penalty xᵀ S x at the fitted
+    x (S. N. Wood, Generalized Additive Models, 2017, section 6.10). The band holds at each tension
+    for itself, and misses EA within some newtons of a kink. It ignores errors of calibration and
+    gauge length, and drift.
     """
 
     tension: Array

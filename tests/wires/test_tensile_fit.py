@@ -28,9 +28,22 @@ RIGIDITIES: dict[str, Callable[[Array], Array]] = {
 
 def made(wire: str, points: int, noise: float, jitter: float, seed: int) -> tuple[Array, Array]:
     """Displacement [m] and force [N] of a test, with noise of both."""
+    lowest = 2.3 if wire == "strand" else 0.0
+    return simulated(RIGIDITIES[wire], points, noise, jitter, seed, lowest)
+
+
+def simulated(
+    rigidity: Callable[[Array], Array],
+    points: int,
+    noise: float,
+    jitter: float,
+    seed: int,
+    lowest: float = 0.0,
+) -> tuple[Array, Array]:
+    """The same for a law EA(F) from a tension [N] on."""
     random = np.random.default_rng(seed)
-    fine = np.linspace(2.3 if wire == "strand" else 0.0, HIGHEST, 40_001)
-    softness = 1.0 / RIGIDITIES[wire]((fine[1:] + fine[:-1]) / 2.0)
+    fine = np.linspace(lowest, HIGHEST, 40_001)
+    softness = 1.0 / rigidity((fine[1:] + fine[:-1]) / 2.0)
     stretch = np.concatenate([[0.0], np.cumsum(np.diff(fine) * softness)])
     strain = np.linspace(0.0, stretch[-1], points)
     force = np.interp(strain, stretch, fine) + noise * random.normal(size=points)
@@ -67,6 +80,31 @@ def test_laws_come_back_and_bands_hold_them(count: int) -> None:
         held.append(np.mean((low <= truth) & (truth <= high)))
     assert np.median(errors) <= 5e-3
     assert np.quantile(errors, 0.9) <= 2.2e-2
+    assert 0.91 < np.mean(held) < (0.98 if count > 100 else 1.0)
+
+
+@pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.long)])
+def test_bands_hold_a_sigmoid_law_under_noise_of_the_displacement(count: int) -> None:
+    """The noise counts as EA times as much force, and the smoothing bends EA at both knees."""
+    random = np.random.default_rng(1)
+    held = []
+    for seed in range(count):
+        middle = random.uniform(300.0, 450.0)
+        width = random.uniform(25.0, 40.0)
+        low = random.uniform(0.2, 0.35)
+
+        def rigidity(
+            F: Array, middle: float = middle, width: float = width, low: float = low
+        ) -> Array:
+            return np.asarray(EA * (low + (1.0 - low) / (1.0 + np.exp(-(F - middle) / width))))
+
+        points = int(random.integers(200, 500))
+        jitter = random.uniform(5e-6, 2e-5)
+        fit = cdsm.fit_tensile_test(*simulated(rigidity, points, 0.2, jitter, seed), GAUGE)
+        F = np.linspace(10.0, 780.0, 78)
+        F = F[(fit.elasticity.low <= F) & (fit.elasticity.high >= F)]
+        lower, upper = (np.interp(F, fit.tension, end) for end in fit.band[1:])
+        held.append(np.mean((lower <= rigidity(F)) & (rigidity(F) <= upper)))
     assert 0.91 < np.mean(held) < (0.98 if count > 100 else 1.0)
 
 
