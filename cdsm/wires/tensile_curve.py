@@ -210,7 +210,7 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
         return np.asarray(max(noise, 1e-4 * reach) * 10.0 ** (power / 2.0) * bends)
 
     def solve(power: float, x: Array) -> tuple[Array, float, Array]:
-        """Return parameters, −2 log likelihood and (JᵀJ + S)⁻¹ for a smoothing of 10^power units."""
+        """Return x, −2 log likelihood and (JᵀJ + S)⁻¹ for a smoothing of 10^power units."""
         root = penalty(power)
         x = least_squares(
             lambda x: np.append(error(x), root @ x),
