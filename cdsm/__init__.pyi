@@ -74,10 +74,10 @@ from cdsm.statics.weight_test import weight_test as weight_test
 from cdsm.status import Status as Status
 from cdsm.stiffness_matrix import Stiffness as Stiffness
 from cdsm.stiffness_matrix import stiffness as stiffness
+from cdsm.sweeps.files import read_sweep as read_sweep
 from cdsm.sweeps.poses import GridPoses as GridPoses
 from cdsm.sweeps.poses import PathPoses as PathPoses
 from cdsm.sweeps.poses import RandomPoses as RandomPoses
-from cdsm.sweeps.sweep import read_sweep as read_sweep
 from cdsm.sweeps.sweep import sweep as sweep
 from cdsm.tension import Tension as Tension
 from cdsm.tension import distribute_tension as distribute_tension

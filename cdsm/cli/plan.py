@@ -137,8 +137,8 @@ def sweep_postures(
         raise misuse("--quantity", "is of --figure; give both.")
     from cdsm.support.status import status_names
     from cdsm.sweeps.cases import DEFAULT
-    from cdsm.sweeps.dataset import read_into_memory
-    from cdsm.sweeps.sweep import write_sweep
+    from cdsm.sweeps.files import write_sweep
+    from cdsm.sweeps.store import read_into_memory
 
     robot = options.load_arm(arm, changes)
     low = options.parse_numbers("--minimum", minimum)

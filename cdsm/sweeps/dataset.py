@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from importlib.metadata import version
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import FileError, InvalidInput
+from cdsm.errors import InvalidInput
+from cdsm.manipulator import Manipulator
 from cdsm.quantities import QUANTITIES, udunits
 from cdsm.status import ENTRY_STATUSES
 from cdsm.stiffness_matrix.prints import frictionless_model
@@ -143,36 +140,13 @@ class Labelled(Cases):
         try:
             arm = arm_text(self.arm.definition)
         except InvalidInput:  # laws made from functions cannot be written
-            arm = f"{vars(self.arm.definition) | {'cables': [*self.arm.cables]}}"
+            arm = _text_of_fields(self.arm)
         about = {"Conventions": "CF-1.11", "title": f"stiffness sweep of {self.arm.name}"}
         about |= {"source": f"cdsm {version('cdsm-stiffness')}", "arm": arm}
         about["model"] = frictionless_model(self.arm)
         if self.worst_friction:
             about["worst_friction"] = "all segments stay within the bounds, whatever came before"
         return about
-
-
-def read_into_memory(data: Any, store: object) -> Any:
-    """Load data of a store; raise FileError if a chunk of it is damaged."""
-    try:
-        return data.load()
-    except RuntimeError as error:  # of the decoder
-        raise FileError(store, f"is damaged ({error}); delete it, and repeat the sweep.") from None
-
-
-@contextmanager
-def only_writer(path: Path) -> Iterator[None]:
-    """Lock a store; FileError if another sweep writes to it. The lock ends with its process."""
-    folder = os.open(path, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            said = "another sweep writes to it; wait for that one, or give another path to store."
-            raise FileError(path, said) from None
-        yield
-    finally:
-        os.close(folder)
 
 
 def _dims(name: str) -> list[str]:
@@ -189,3 +163,15 @@ def _labels(dim: str, names: Sequence[object]) -> tuple[str, NDArray[Any], dict[
         return dim, np.array(names, dtype=object), {"long_name": f"name of the {dim}"}
     about = {"long_name": f"number of the {dim}", "units": "1"}
     return dim, np.array(names, dtype=np.int64), about
+
+
+def _text_of_fields(arm: Manipulator) -> str:
+    """Describe an arm by TOML with the ``repr`` of each of its fields, and of those of cables."""
+    from cdsm.support.records import toml_text  # pydantic: slow to import
+
+    table: dict[str, Any] = {name: repr(value) for name, value in vars(arm.definition).items()}
+    table["cables"] = {
+        cable.name: {field.name: repr(getattr(cable, field.name)) for field in fields(cable)}
+        for cable in arm.cables
+    }
+    return toml_text(table)

@@ -144,14 +144,20 @@ def test_too_little_memory_is_told(probe: Path, monkeypatch: pytest.MonkeyPatch)
     assert "out of memory" in told("stiffness", probe, "--minimum", 9, code=1)["message"]
 
 
-def test_a_damaged_store_is_named(probe: Path) -> None:
+def test_a_damaged_store_is_named_and_its_status_computed_again(probe: Path) -> None:
     store = probe.with_name("s.zarr")
+    table = probe.with_name("s.csv")
     words = ("sweep", probe, "--random", 5, "--minimum", 9, "--store", store)
-    assert call(*words).exit_code == 0
-    for damaged in ("margin", "status"):
-        (store / damaged / "c" / "0").write_bytes(b"no chunk")
-        result = call(*words, "--out", probe.with_name("s.csv"))
-        assert (result.exit_code, "s.zarr: is damaged" in result.stderr) == (1, True)
+    assert call(*words, "--out", table).exit_code == 0
+    whole = table.read_text(encoding="utf-8")
+    (store / "margin" / "c" / "0").write_bytes(b"no chunk")
+    result = call(*words, "--out", table)
+    assert result.exit_code == 1
+    assert "s.zarr: is damaged: margin" in result.stderr
+    assert "Delete status/c/0" in result.stderr
+    (store / "status" / "c" / "0").write_bytes(b"no chunk")  # as if deleted
+    assert call(*words, "--out", table).exit_code == 0
+    assert table.read_text(encoding="utf-8") == whole
 
 
 def test_help_fits_a_terminal() -> None:
