@@ -58,15 +58,15 @@ class ArmParameters:
         for name in self.names:
             parameter = parameter_of(name)
             if parameter.is_spring and self.arm.definition.springs is not None:
-                said = "the springs of the arm are not those of its geometry, which alone is varied"
+                problem = "its springs are not those of its geometry, which alone is varied"
                 remedy = "Give them by joint_stiffness= of the geometry."
-                raise InvalidInput(name, f"{said}. {remedy}")
+                raise InvalidInput(name, f"{self.arm.name}: {problem}. {remedy}")
             for place in self.places(name):
                 number = parameter.shares or name.partition("@")[0]
                 if (number, place) in free:
                     other = free[number, place]
-                    said = f"changes a number that {other} changes too; name it once."
-                    raise InvalidInput(name, said)
+                    problem = f"changes a number that {other} changes too; name it once."
+                    raise InvalidInput(name, problem)
                 free[number, place] = name
 
     def unit(self, name: str) -> tuple[str, float]:
@@ -151,8 +151,8 @@ class ArmParameters:
         kinds = [kind for kind in parameter.kinds if kind in parts]
         if not kinds:
             free = [key for key, row in PARAMETERS.items() if "cables" in row.kinds]
-            said = "is not known of an arm from a URDF"
-            raise InvalidInput(name, f"{said}; its cables have {', '.join(free)}.")
+            problem = "is not known of an arm from a URDF"
+            raise InvalidInput(name, f"{problem}; its cables have {', '.join(free)}.")
         owners = {(kind, i) for kind in kinds for i in self._at(name, kind)}
         places = [
             (kind, i)

@@ -37,12 +37,12 @@ def number(kind: str, default: float, *, zero: bool = False, infinite: bool = Fa
 
 def check_numbers(value: object) -> None:
     """Check all fields of a frozen dataclass that :func:`number` declares; InvalidInput."""
-    for own in fields(value):  # type: ignore[arg-type]
-        if "range" in own.metadata:
-            kind, zero, infinite = own.metadata["range"]
-            given = getattr(value, own.name)
-            checked = checked_quantity(own.name, given, kind, zero=zero, infinite=infinite)
-            value.__dict__[own.name] = checked
+    for attribute in fields(value):  # type: ignore[arg-type]
+        name = attribute.name
+        if "range" in attribute.metadata:
+            kind, zero, infinite = attribute.metadata["range"]
+            size = checked_quantity(name, getattr(value, name), kind, zero=zero, infinite=infinite)
+            value.__dict__[name] = size
 
 
 @final
@@ -132,8 +132,8 @@ class Cable:
         for i in {0, len(sites) - 1}.difference(self._holes):
             if sites[i].friction or sites[i].wrap:
                 why = "ends there; only" if i else "starts there. Give a lead; only"
-                said = f"site {i + 1} has friction or wrap, but the cable {why} holes have them."
-                raise InvalidInput(f"cable {self.name!r}", said)
+                problem = f"site {i + 1} has friction or wrap, but the cable {why} holes have them."
+                raise InvalidInput(f"cable {self.name!r}", problem)
 
     @property
     def _holes(self) -> range:
@@ -176,7 +176,7 @@ class Cable:
 
 
 _OF_ONE: Final = ("name", "sites", "elasticity", "lead")
-SETTINGS: Final = tuple(own.name for own in fields(Cable) if own.name not in _OF_ONE)
+SETTINGS: Final = tuple(setting.name for setting in fields(Cable) if setting.name not in _OF_ONE)
 """Fields of a :class:`Cable` that files have as keys, for all cables or for one."""
 
 
@@ -276,10 +276,12 @@ def require_own_cables(geometry: Geometry, cables: Sequence[Cable]) -> None:
     What is built from values of the geometry would replace them. Raises InvalidInput.
     """
     routed = serpentine_cables(geometry, cables[0].elasticity)
-    own = {cable.name: _path(cable) for cable in routed}
-    given = {c.name: _path(c) for c in cables}
-    if list(own.items()) != list(given.items()):
-        other = listed([name for name in own | given if own.get(name) != given.get(name)])
+    routed_paths = {cable.name: _path(cable) for cable in routed}
+    paths = {c.name: _path(c) for c in cables}
+    if list(routed_paths.items()) != list(paths.items()):
+        other = listed(
+            [name for name in routed_paths | paths if routed_paths.get(name) != paths.get(name)]
+        )
         raise InvalidInput(
             "arm",
             f"the lead or the holes of {other} are not those of its geometry, which alone is "

@@ -26,17 +26,17 @@ class Unit(NamedTuple):
 
     si: str
     quantity: str | None = None
-    own: tuple[str, float] | None = None  # unit for people and its size, if not that of DISPLAY
+    display: tuple[str, float] | None = None  # unit for people and its size, if not that of DISPLAY
 
     @property
     def shown(self) -> tuple[str, float]:
         """Unit in which people read a value, and its size in SI."""
-        return self.own or DISPLAY.get(self.si, (self.si, 1.0))
+        return self.display or DISPLAY.get(self.si, (self.si, 1.0))
 
 
 METRE: Final = Unit("m", "length")
-RADIAN: Final = Unit("rad", own=("deg", math.pi / 180.0))
-KILOGRAM: Final = Unit("kg", "mass", own=("g", 1e-3))
+RADIAN: Final = Unit("rad", display=("deg", math.pi / 180.0))
+KILOGRAM: Final = Unit("kg", "mass", display=("g", 1e-3))
 NEWTON: Final = Unit("N", "tension")
 STIFFNESS: Final = Unit("N/m", "stiffness")
 SPRING: Final = Unit("N m/rad", "spring")

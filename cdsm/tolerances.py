@@ -31,9 +31,9 @@ def sources() -> dict[str, Source]:
 
     Random errors are drawn in this order: another one gives other draws of the same seed.
     """
-    own = {name: row for name, row in PARAMETERS.items() if row.shares is None}
-    relative = {name: row for name, row in own.items() if row.is_relative}
-    return relative | _READINGS | own | _SITE
+    numbers = {name: row for name, row in PARAMETERS.items() if row.shares is None}
+    relative = {name: row for name, row in numbers.items() if row.is_relative}
+    return relative | _READINGS | numbers | _SITE
 
 
 @final
@@ -145,8 +145,8 @@ class Tolerances:
         """
         try:
             table = read_toml(read_text(path))
-            own = table.get("tolerances", table)
-            return from_table(own if isinstance(own, dict) else table)
+            tolerances = table.get("tolerances", table)
+            return from_table(tolerances if isinstance(tolerances, dict) else table)
         except GeometryError as error:
             faults = listed(error.faults, 20, LINES)
             raise FileError(path, f"does not hold tolerances:{faults}") from None
@@ -170,8 +170,8 @@ def _checked(name: str, value: Any) -> tuple[Tolerance, ...]:
     u = max([0.0, *(tolerance.standard for tolerance in tolerances)])
     if u > source.largest:
         unit = "relative" if source.is_relative else f"in {source.unit.si or 'the number itself'}"
-        said = f"a standard uncertainty of {u:g} given; up to {source.largest:g} is a tolerance"
-        raise InvalidInput(name, f"{said}. It is {unit}.")
+        problem = f"a standard uncertainty of {u:g} given; up to {source.largest:g} is a tolerance"
+        raise InvalidInput(name, f"{problem}. It is {unit}.")
     return tuple(tolerance for tolerance in tolerances if tolerance.standard)
 
 
@@ -203,29 +203,29 @@ def from_table(table: Mapping[str, Any]) -> Tolerances:
     """Build tolerances from a parsed TOML table; raise GeometryError that lists every fault."""
     if not isinstance(table, Mapping):
         raise GeometryError([f"is {table!r}; give a table [tolerances]"])
-    found = {}
+    read = {}
     faults = []
     for name, value in table.items():
         try:
             one_of("source of uncertainty", name, sources())
             if isinstance(value, (dict, list)):
                 tables = [value] if isinstance(value, dict) else value
-                value = [parse(_Entry, each).built(name) for each in tables]
-            found[name] = _checked(name, value)
+                value = [parse(_Entry, entry).built(name) for entry in tables]
+            read[name] = _checked(name, value)
         except GeometryError as error:
             faults += [f"{name}.{fault}" for fault in error.faults]
         except CdsmError as error:
             faults.append(f"{name}: {str(error).removeprefix(f'{name}: ')}")
     if faults:
         raise GeometryError(faults)
-    return Tolerances(**found)
+    return Tolerances(**read)
 
 
 def table_of(tolerances: Tolerances) -> dict[str, list[dict[str, Any]]]:
     """Return the table of TOML from which :func:`from_table` builds equal tolerances."""
-    given = {name: map(vars, parts) for name, parts in tolerances.given.items()}
+    tables = {name: map(vars, parts) for name, parts in tolerances.given.items()}
     usual = "normal", EVERY
     return {
         name: [{key: x for key, x in part.items() if x not in usual} for part in parts]
-        for name, parts in given.items()
+        for name, parts in tables.items()
     }

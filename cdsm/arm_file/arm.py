@@ -89,7 +89,7 @@ def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
         raise InvalidInput("cables", "none given; there is nothing to write.")
     values, tables = _wire_tables(cables)
     entries = [
-        _routed(each, {"wire": values[each.elasticity], **_settings(each)}) for each in cables
+        _routed(cable, {"wire": values[cable.elasticity], **_settings(cable)}) for cable in cables
     ]
     return write_text(path, _cables_head() + toml_text({"wires": tables, "cables": entries}))
 
@@ -110,7 +110,7 @@ def _settings(cable: Cable) -> dict[str, Any]:
     return {key: x for key in SETTINGS if (x := getattr(cable, key)) != _USUAL[key]}
 
 
-def _routed(cable: Cable, own: dict[str, Any]) -> dict[str, Any]:
+def _routed(cable: Cable, settings: dict[str, Any]) -> dict[str, Any]:
     """Return the TOML table of a cable with its sites and the settings ``own``."""
     sites = [
         {"link": site.link, "xyz": site.position}
@@ -118,7 +118,7 @@ def _routed(cable: Cable, own: dict[str, Any]) -> dict[str, Any]:
         for site in cable.sites
     ]
     lead = {"lead": cable.lead} if cable.lead else {}
-    return {"name": cable.name, **lead, **own, "sites": one_line_each(sites)}
+    return {"name": cable.name, **lead, **settings, "sites": one_line_each(sites)}
 
 
 _OTHERS: Final = ("geometry", "urdf", "cables", "wire", "original_length")
@@ -162,9 +162,11 @@ def arm_text(arm: ArmDefinition) -> str:
     cables = arm.cables
     geometry = arm.geometry
     values, tables = _wire_tables(cables)
-    owns = [{"wire": values[each.elasticity]} | _settings(each) for each in cables]
-    shared = {key: x for key, x in owns[0].items() if all(own.get(key) == x for own in owns)}
-    owns = [{key: x for key, x in own.items() if key not in shared} for own in owns]
+    owns = [{"wire": values[cable.elasticity]} | _settings(cable) for cable in cables]
+    shared = {
+        key: x for key, x in owns[0].items() if all(settings.get(key) == x for settings in owns)
+    }
+    owns = [{key: x for key, x in settings.items() if key not in shared} for settings in owns]
     data = {key: _TABLES.get(key, _as_it_is)(getattr(arm, key)) for key in _KEYS}
     data |= shared | {"wires": tables}
     plain: tuple[Cable, ...] = ()
@@ -173,11 +175,11 @@ def arm_text(arm: ArmDefinition) -> str:
     else:
         data["geometry"] = geometry._table
         plain = serpentine_cables(geometry, cables[0].elasticity)
-    each = zip(cables, owns, strict=True)
+    pairs = zip(cables, owns, strict=True)
     if [(c.name, c.sites, c.lead) for c in plain] == [(c.name, c.sites, c.lead) for c in cables]:
-        data["cables"] = {cable.name: own for cable, own in each if own}
+        data["cables"] = {cable.name: settings for cable, settings in pairs if settings}
     else:
-        data["cables"] = [_routed(cable, own) for cable, own in each]
+        data["cables"] = [_routed(cable, settings) for cable, settings in pairs]
     return _ARM_HEAD + toml_text(data)
 
 
@@ -205,7 +207,9 @@ def template(
     are left out.
     """
     text = files("cdsm.arm_file").joinpath("template.toml").read_text("utf-8")
-    section = next(each for each in text.split("\n\n") if each.startswith("[[sections]]"))
+    section = next(
+        paragraph for paragraph in text.split("\n\n") if paragraph.startswith("[[sections]]")
+    )
     header, *lines = section.split("\n")
     robot = []
     for i, (kind, sizes) in enumerate(sections):
@@ -215,8 +219,8 @@ def template(
         values["start"] = "end of the section before" if i else "base frame"
         values["disk_radius"] = f"{1.2 * sizes['hole_radius']:.4g}"
         values["cable_radius"] = f"{sizes['hole_radius'] / 2.0:.4g}"
-        own = [line for line in lines if line[0] in "#[" or line.split(" = ")[0] in sizes]
-        robot.append(Template("\n".join([header][: len(sections) - 1] + own)).substitute(values))
+        kept = [line for line in lines if line[0] in "#[" or line.split(" = ")[0] in sizes]
+        robot.append(Template("\n".join([header][: len(sections) - 1] + kept)).substitute(values))
     return Template(text.replace(section, "\n\n".join(robot))).substitute(
         name=name, wire=json.dumps(wire), wires=", ".join(WIRES), minimum=minimum
     )

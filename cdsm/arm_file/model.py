@@ -47,18 +47,18 @@ def _read_tables(
 ) -> dict[str, Any]:
     """Read the tables of a file, ``changes`` laid over them, and the files of wires they name."""
     if any(Path(path).glob("*_bodies.xml")):
-        said = f"is the folder of a CASPR model. {_FROM} --wire EA`, and give that."
-        raise FileError(path, said.format(path=path))
+        problem = f"is the folder of a CASPR model. {_FROM} --wire EA`, and give that."
+        raise FileError(path, problem.format(path=path))
     if str(path).endswith((".nc", ".zarr", ".csv")):
         raise FileError(path, "is a sweep or a table, no arm; give an ARM.toml.")
     text = read_text(path)
     if robot and text.lstrip("\ufeff \t\r\n").startswith("<"):
-        said = next(said for sign, said in _OTHERS.items() if sign in text)
-        raise FileError(path, said.format(path=path))
+        problem = next(problem for sign, problem in _OTHERS.items() if sign in text)
+        raise FileError(path, problem.format(path=path))
     tables: dict[str, Any] = laid_over(read_toml(text), changes or {})
     cables = tables.get("cables")
-    each = [*cables.values()] if isinstance(cables, dict) else cables
-    for table in (tables, *(each if isinstance(each, list) else ())):
+    cable_tables = [*cables.values()] if isinstance(cables, dict) else cables
+    for table in (tables, *(cable_tables if isinstance(cable_tables, list) else ())):
         wire = table.get("wire") if isinstance(table, dict) else None
         if is_file(wire):
             table["wire"] = table_of(read_law(Path(path).parent / wire))
@@ -145,7 +145,7 @@ def _law_of(wire: Any, known: Mapping[str, Any]) -> Elasticity:
 _Gravity = Annotated[
     Annotated[Any, Tag(ONE)] | Annotated[records.Direction, Tag(EACH)],
     Discriminator(records.one_or_each),
-    AfterValidator(lambda given: gravity_vector("gravity", given)),
+    AfterValidator(lambda value: gravity_vector("gravity", value)),
 ]
 _Label = Annotated[str, Field(min_length=1, max_length=200)]
 _Law = Annotated[Any, PlainValidator(from_table)]
@@ -157,14 +157,14 @@ _CHECKS: Final = {"maximum": AfterValidator(_ordered)}  # of a key and those bef
 def _with_settings(cls: type[_Record]) -> type[_Record]:
     """Give a record the keys that are fields of a :class:`Cable`; None: the key is not given."""
     types = get_type_hints(Cable)
-    for own in fields(Cable):
-        if own.name in SETTINGS:
-            kind, zero, _ = own.metadata.get("range", ("", False, False))
+    for setting in fields(Cable):
+        if setting.name in SETTINGS:
+            kind, zero, _ = setting.metadata.get("range", ("", False, False))
             number = Annotated[records.Number, records.in_range(kind, zero)]
-            key = (number if kind else types[own.name]) | None
-            check = _CHECKS.get(own.name)
-            cls.__annotations__[own.name] = Annotated[key, check] if check else key
-            setattr(cls, own.name, None)
+            key = (number if kind else types[setting.name]) | None
+            check = _CHECKS.get(setting.name)
+            cls.__annotations__[setting.name] = Annotated[key, check] if check else key
+            setattr(cls, setting.name, None)
     return cls
 
 
@@ -194,9 +194,9 @@ class _Routed(_Settings):
         """Return the cable; ``friction`` is that of holes without one of their own."""
         holes = range(0 if self.lead else 1, len(self.sites) - 1)
         sites = [
-            Site(each.link, each.xyz, friction * (i in holes) if mu is None else mu, each.wrap)
-            for i, each in enumerate(self.sites)
-            for mu in [each.friction]
+            Site(site.link, site.xyz, friction * (i in holes) if mu is None else mu, site.wrap)
+            for i, site in enumerate(self.sites)
+            for mu in [site.friction]
         ]
         return Cable(self.name, tuple(sites), _NO_WIRE, self.lead)
 
@@ -227,40 +227,40 @@ _Tables = Annotated[
 ]
 
 
-def _built(given: Any, check: Callable[[Any], Any], info: Info) -> Cables:
+def _built(value: Any, check: Callable[[Any], Any], info: Info) -> Cables:
     """Build all cables; tables of single cables change those of the geometry."""
     known = info.data
-    if known.get("geometry", ...) is None and not isinstance(given, list):
+    if known.get("geometry", ...) is None and not isinstance(value, list):
         raise ValueError("give tables [[cables]], one for each cable")
-    tables = check({} if given is None else given)
+    tables = check({} if value is None else value)
     faults = list[str]()
     routes: dict[str, Any]
     if isinstance(tables, tuple):
-        routes = {f"[{i}]": each for i, each in enumerate(tables, start=1)}
-        names = [each.name for each in tables]
+        routes = {f"[{i}]": table for i, table in enumerate(tables, start=1)}
+        names = [table.name for table in tables]
         twice = [i for i, name in enumerate(names) if name in names[:i]]
         faults = [f"[{i + 1}].name: {names[i]!r} is used twice" for i in twice]
     elif geometry := known.get("geometry"):
-        routes = {each.name: each for each in serpentine_cables(geometry, _NO_WIRE)}
+        routes = {cable.name: cable for cable in serpentine_cables(geometry, _NO_WIRE)}
     else:
         return Cables()  # its faults are told
     shared = _given(known)
     cables = []
     for where, route in routes.items():
-        own = route if isinstance(route, _Routed) else tables.get(where, _Settings())
+        settings = route if isinstance(route, _Routed) else tables.get(where, _Settings())
         place = f"{where}.wire"
         try:
-            law = known.get("wire") if own.wire is None else _law_of(own.wire, known)
+            law = known.get("wire") if settings.wire is None else _law_of(settings.wire, known)
             place = where
-            given = shared | _given(vars(own))
-            mu = given.pop("friction", None)
-            slack = given.pop("slack_below", False)
+            keys = shared | _given(vars(settings))
+            mu = keys.pop("friction", None)
+            slack = keys.pop("slack_below", False)
             law = law.slack_below() if law and slack else law or _NO_WIRE
             if isinstance(route, _Routed):
                 route = route.built(mu or 0.0)
             elif mu is not None:
                 route = route.with_friction(mu)
-            cables.append(replace(route, elasticity=law, **given))
+            cables.append(replace(route, elasticity=law, **keys))
         except ValueError as error:
             faults += records.faults_at(place, error)
     if faults:
@@ -340,6 +340,6 @@ def read_model(
         whose = f"the cables {listed(without)}" if len(without) < len(cables) else "its cables"
         remedy = 'write at its top: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
         gives = "read (commands: --set wire=48e3)" if robot else "read_cables (cdsm new: --wire)"
-        said = f"has no wire for {whose}. Give a wire to {gives}, or {remedy}"
-        raise FileError(path, said)
+        problem = f"has no wire for {whose}. Give a wire to {gives}, or {remedy}"
+        raise FileError(path, problem)
     return file, cables

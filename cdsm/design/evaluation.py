@@ -61,7 +61,7 @@ class Designs(ReadOnlyState, IndexedByName):
 
     def keys(self) -> tuple[str, ...]:
         """Return the keys of the quantities."""
-        return tuple(each.key for each in self.problem.measures)
+        return tuple(measure.key for measure in self.problem.measures)
 
     @property
     def violations(self) -> Array:
@@ -71,16 +71,18 @@ class Designs(ReadOnlyState, IndexedByName):
         or unstable. It is 0 if the problem does not require that all are held.
         """
         held = np.nan_to_num(self[MISSED])
-        found = [self.problem.needs_all * (1.0 - held)]
-        for each in self.problem.constraints:
-            inside = each.distance(self[each.key])
-            found.append(np.where(np.isnan(inside), np.inf, np.maximum(-inside, 0.0)))
-        return np.column_stack(found)
+        columns = [self.problem.needs_all * (1.0 - held)]
+        for constraint in self.problem.constraints:
+            inside = constraint.distance(self[constraint.key])
+            columns.append(np.where(np.isnan(inside), np.inf, np.maximum(-inside, 0.0)))
+        return np.column_stack(columns)
 
     @property
     def goals(self) -> Array:
         """Objectives (D, objectives), negated if they are maximised: searches minimise them."""
-        return np.column_stack([each.sign * self[each.key] for each in self.problem.objectives])
+        return np.column_stack(
+            [objective.sign * self[objective.key] for objective in self.problem.objectives]
+        )
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
@@ -179,9 +181,9 @@ def evaluate_designs(
         return gathered(problem, rows, compute(rows))
 
 
-def gathered(problem: DesignProblem, rows: Array, found: Iterable[Measured]) -> Designs:
+def gathered(problem: DesignProblem, rows: Array, results: Iterable[Measured]) -> Designs:
     """Build :class:`Designs` from ``rows``, the designs (D, n), and ``found``, their quantities."""
-    values, faults = zip(*found, strict=True) if len(rows) else ((), ())
+    values, faults = zip(*results, strict=True) if len(rows) else ((), ())
     return Designs(
         problem=problem,
         designs=frozen(rows.copy()),
@@ -202,10 +204,10 @@ def workers(
     compute = partial(measure, problem)
     with progress_bar("designs", total, wanted=progress) as advance:
 
-        def counted(found: Iterable[Measured]) -> Iterator[Measured]:
-            for each in found:
+        def counted(results: Iterable[Measured]) -> Iterator[Measured]:
+            for result in results:
                 advance(1)
-                yield each
+                yield result
 
         if jobs == 1:
             yield lambda rows: counted(map(compute, rows))
@@ -240,28 +242,28 @@ def explain(designs: Designs) -> NoReturn:
         raise InfeasibleDesign(f"none of {count} is an arm: {designs.faults[0]}", (), ())
     best = int(np.where(arms, missed.sum(axis=1), np.inf).argmin())
     row = designs.designs[best]
-    said = dict[str, str]()
+    misses = dict[str, str]()
     if missed[best, 0] > 0.0:
         share = f"{100.0 * missed[best, 0]:.3g} %"
         why = _first_reason(problem, row)
-        said["held"] = f"{share} of its postures and loads are not held: {why}"
-    for each, miss in zip(problem.constraints, missed[best, 1:].tolist(), strict=True):
+        misses["held"] = f"{share} of its postures and loads are not held: {why}"
+    for constraint, miss in zip(problem.constraints, missed[best, 1:].tolist(), strict=True):
         if miss > 0.0:
-            value = float(designs[each.key][best])
-            now = "does not exist" if np.isnan(value) else each.shown(value)
+            value = float(designs[constraint.key][best])
+            now = "does not exist" if np.isnan(value) else constraint.shown(value)
             far = f", {100.0 * miss:.3g} % off" if miss < 1e9 else ""
-            said[each.key] = f"{each.words} {now}, {each.asked} is asked{far}"
+            misses[constraint.key] = f"{constraint.words} {now}, {constraint.asked} is asked{far}"
     for objective in problem.objectives:
         value = float(designs[objective.key][best])
         if not np.isfinite(value):
-            said.setdefault(objective.key, f"{objective.words} is {objective.shown(value)}")
+            misses.setdefault(objective.key, f"{objective.words} is {objective.shown(value)}")
     values = zip(problem.variables, problem.values(row), strict=True)
-    chosen = ", ".join(f"{each.of} {each.shown(value)}" for each, value in values)
+    chosen = ", ".join(f"{variable.of} {variable.shown(value)}" for variable, value in values)
     raise InfeasibleDesign(
         f"none of {count} meets all constraints. The nearest one ({chosen}) misses: "
-        f"{'; '.join(said.values()).rstrip('.')}. Loosen what it misses, widen a variable, or "
+        f"{'; '.join(misses.values()).rstrip('.')}. Loosen what it misses, widen a variable, or "
         "search longer.",
-        tuple(said),
+        tuple(misses),
         tuple(row.tolist()),
     )
 

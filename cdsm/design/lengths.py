@@ -27,15 +27,15 @@ def length_bounds(arm: Manipulator) -> tuple[Array, Array]:
     paths = dict[tuple[int, ...], list[int]]()
     for s, (path, sign) in enumerate(zip(routing.path, routing.sign, strict=True)):
         paths.setdefault(tuple(path[sign != 0.0].tolist()), []).append(s)
-    found = np.tile(routing.fixed, (2, 1))
+    bounds = np.tile(routing.fixed, (2, 1))
     for path, segments in paths.items():
         a = routing.point[routing.first[segments]]
         b = routing.point[routing.second[segments]]
         j = list(path)
         joints = table.arm.turn[j], table.dimensions.shift[j], low[j], high[j]
-        for sign, total in zip((-1.0, 1.0), found, strict=True):
+        for sign, total in zip((-1.0, 1.0), bounds, strict=True):
             np.add.at(total, routing.cable[segments], sign * _longest(a, b, *joints, sign))
-    return found[0], found[1]
+    return bounds[0], bounds[1]
 
 
 def _longest(
@@ -51,7 +51,7 @@ def _longest(
     corners = [*np.ndindex(*[2] * m)] if 2**m <= _STARTS else rng.integers(2, size=(_STARTS, m))
     starts = np.vstack([corners, rng.uniform(size=(_STARTS, m))])
     q = np.repeat((low + (high - low) * starts).T[:, None], len(a), axis=1)  # (m, S, N)
-    first, last = (np.repeat(each[:, None], q.shape[2], axis=1) for each in (a, b))
+    first, last = (np.repeat(site[:, None], q.shape[2], axis=1) for site in (a, b))
     length = np.zeros(q.shape[1:])
     change = np.inf
     sweeps = 0
@@ -70,7 +70,7 @@ def _longest(
             seen = seen - shift[j]
             (_, B, C) = turn[j]
             p = carried[m - 1 - j]
-            x, y = (-sign * (seen * (p @ each.T)).sum(axis=2) for each in (B, C))
+            x, y = (-sign * (seen * (p @ matrix.T)).sum(axis=2) for matrix in (B, C))
             best = np.arctan2(y, x)
             nearer = np.where(np.cos(best - low[j]) > np.cos(best - high[j]), low[j], high[j])
             q[j] = np.where((low[j] <= best) & (best <= high[j]), best, nearer)
@@ -83,5 +83,5 @@ def _longest(
 
 def _turned(turn: Array, q: Array, p: Array) -> Array:
     """Turn points p (…, 3) by (A + B cos q + C sin q)."""
-    A, B, C = (p @ each.T for each in turn)
+    A, B, C = (p @ matrix.T for matrix in turn)
     return np.asarray(A + np.cos(q)[..., None] * B + np.sin(q)[..., None] * C)

@@ -128,9 +128,9 @@ class DesignProblem(ReadOnlyState):
     @cached_property
     def measures(self) -> tuple[Measure, ...]:
         """All quantities of objectives and constraints, each once, and ``held``."""
-        asked = {each.key: each for each in (*self.objectives, *self.constraints)}
+        asked = {measure.key: measure for measure in (*self.objectives, *self.constraints)}
         asked.setdefault(MISSED, Measure("held"))
-        return tuple(Measure(each.of, each.direction) for each in asked.values())
+        return tuple(Measure(measure.of, measure.direction) for measure in asked.values())
 
     @property
     def needs_all(self) -> bool:
@@ -138,15 +138,17 @@ class DesignProblem(ReadOnlyState):
 
         It is False if an objective or a constraint is on ``held`` or ``workspace``.
         """
-        asked = {each.of for each in (*self.objectives, *self.constraints)}
+        asked = {measure.of for measure in (*self.objectives, *self.constraints)}
         return not asked & {"held", "workspace"}
 
     @cached_property
     def bounds(self) -> Array:
         """Smallest and largest value of each variable (n, 2) in SI; for choices, their indices."""
         ends = [
-            (0.0, len(each.choices) - 1.0) if each.choices else (each.low, each.high)
-            for each in self.variables
+            (0.0, len(variable.choices) - 1.0)
+            if variable.choices
+            else (variable.low, variable.high)
+            for variable in self.variables
         ]
         return frozen(np.array(ends, dtype=np.float64))
 
@@ -160,15 +162,15 @@ class DesignProblem(ReadOnlyState):
         low, high = self.bounds.T
         if x.shape != low.shape:
             raise InvalidInput("design", f"shape {x.shape} given, {low.shape} needed.")
-        found: list[Value] = []
+        values: list[Value] = []
         for variable, number, a, b in zip(self.variables, x.tolist(), low, high, strict=True):
             if not a <= number <= b:
-                said = f"{variable.of} = {number:g} is outside {a:g} to {b:g}."
-                raise InvalidInput("design", said)
+                problem = f"{variable.of} = {number:g} is outside {a:g} to {b:g}."
+                raise InvalidInput("design", problem)
             whole = variable.choices or variable.kind in WHOLE
             value = round(number) if whole else number
-            found.append(variable.choices[int(value)] if variable.choices else value)
-        return tuple(found)
+            values.append(variable.choices[int(value)] if variable.choices else value)
+        return tuple(values)
 
     def arm_of(self, design: ArrayLike) -> Manipulator:
         """Build the arm of a design (n,), see :meth:`values`; its cables get the problem's bounds.
@@ -201,9 +203,9 @@ class DesignProblem(ReadOnlyState):
     @cached_property
     def start(self) -> Array | None:
         """:attr:`arm` as a design (n,) [m, rad, N, -]; None if a variable is outside its range."""
-        found = [each.present(self.arm, self.minimum) for each in self.variables]
-        known = [each for each in found if each is not None]
-        return frozen(np.array(known)) if len(known) == len(found) else None
+        values = [variable.present(self.arm, self.minimum) for variable in self.variables]
+        known = [value for value in values if value is not None]
+        return frozen(np.array(known)) if len(known) == len(values) else None
 
     def __repr__(self) -> str:
         return f"<DesignProblem {str(self).splitlines()[0]}>"
@@ -211,24 +213,28 @@ class DesignProblem(ReadOnlyState):
     def __str__(self) -> str:
         counts = plural(len(self.variables), "variable"), plural(len(self.loads), "load")
         lines = [f"{self.arm.name}: {', '.join(counts)}"]
-        for each in self.variables:
-            ends = f"{each.shown(each.low or 0.0)} to {each.shown(each.high or 0.0)}"
-            lines.append(f"  {each.of}: {', '.join(map(each.shown, each.choices)) or ends}")
-        lines += [f"  {each.goal}: {each.words}" for each in self.objectives]
-        lines += [f"  {each.words}: {each.asked}" for each in self.constraints]
+        for variable in self.variables:
+            ends = (
+                f"{variable.shown(variable.low or 0.0)} to {variable.shown(variable.high or 0.0)}"
+            )
+            lines.append(
+                f"  {variable.of}: {', '.join(map(variable.shown, variable.choices)) or ends}"
+            )
+        lines += [f"  {objective.goal}: {objective.words}" for objective in self.objectives]
+        lines += [f"  {constraint.words}: {constraint.asked}" for constraint in self.constraints]
         return "\n".join(lines)
 
 
 def _require_compatible(variables: Sequence[Variable], arm: Manipulator) -> None:
     """Raise InvalidInput unless the arm has what the variables change, each once."""
-    for each in variables:
-        each.require(arm)
-    ArmParameters(arm, tuple(each.of for each in variables if each.kind in PARAMETERS))
-    others = [each.of for each in variables if each.kind not in PARAMETERS]
+    for variable in variables:
+        variable.require(arm)
+    ArmParameters(arm, tuple(variable.of for variable in variables if variable.kind in PARAMETERS))
+    others = [variable.of for variable in variables if variable.kind not in PARAMETERS]
     if len({*others}) < len(others):
         twice = next(name for name in others if others.count(name) > 1)
         raise InvalidInput("variables", f"{twice} is named twice.")
-    kinds = {each.kind for each in variables}
-    of_cables = [each.of for each in variables if "@cable" in each.of]
+    kinds = {variable.kind for variable in variables}
+    of_cables = [variable.of for variable in variables if "@cable" in variable.of]
     if "cables_per_joint" in kinds and of_cables:
         raise InvalidInput("variables", f"cables_per_joint replaces the cable of {of_cables[0]}.")

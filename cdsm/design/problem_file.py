@@ -114,7 +114,7 @@ def _built(
 ) -> tuple[_Kind, ...]:
     """Build one ``kind`` from each table; add what is wrong to ``faults``."""
     made = list[_Kind]()
-    known = [each.name for each in fields(kind)]  # type: ignore[arg-type]
+    known = [attribute.name for attribute in fields(kind)]  # type: ignore[arg-type]
     for i, table in enumerate(tables, start=1):
         where = f"{name}[{i}]"
         try:
@@ -129,16 +129,19 @@ def _built(
 
 
 def _postures(entry: _Postures) -> PoseSet | Any:
-    if sum(each is not None for each in (entry.random, entry.grid, entry.angles)) != 1:
+    if (
+        sum(entry_of_form is not None for entry_of_form in (entry.random, entry.grid, entry.angles))
+        != 1
+    ):
         raise InvalidInput("random", "give one of random, grid and angles.")
     if entry.random is not None:
         return RandomPoses(entry.random, entry.seed)
     return GridPoses(entry.grid) if entry.grid is not None else entry.angles
 
 
-def _check_angles(given: Any, joints: Sequence[str]) -> None:
+def _check_angles(angles: Any, joints: Sequence[str]) -> None:
     """Check that each posture of a list has an angle for each joint; GeometryError otherwise."""
-    rows = given if isinstance(given, list) else []
+    rows = angles if isinstance(angles, list) else []
     faults = [
         f"postures: angles[{i}] has {plural(len(row), 'number')}; give {len(joints)} [rad], one "
         f"for each of {', '.join(joints)}"
@@ -149,10 +152,10 @@ def _check_angles(given: Any, joints: Sequence[str]) -> None:
         raise GeometryError(faults)
 
 
-def _loads(given: Any) -> Any:
-    if given is None:
+def _loads(loads: Any) -> Any:
+    if loads is None:
         return np.zeros((1, 6))
-    rows = given if isinstance(given, list) and given and isinstance(given[0], list) else [given]
+    rows = loads if isinstance(loads, list) and loads and isinstance(loads[0], list) else [loads]
     return [
         [*row, 0.0, 0.0, 0.0] if isinstance(row, list) and len(row) == 3 else row for row in rows
     ]

@@ -158,9 +158,11 @@ class DesignSearch(ReadOnlyState, Plotted):
             f"{plural(len(self.evaluated), 'design')}, {feasible} feasible, {count} on the front"
             f"{more}; * is the compromise"
         )
-        asked = [f"asked: {each.words} {each.asked}" for each in problem.constraints]
+        asked = [
+            f"asked: {constraint.words} {constraint.asked}" for constraint in problem.constraints
+        ]
         notes = []
-        if "deflection" in {each.of for each in problem.measures}:
+        if "deflection" in {measure.of for measure in problem.measures}:
             notes = [_DEFLECTION]
         return "\n".join([head, *aligned(self._table(shown)), *asked, *notes])
 
@@ -185,8 +187,8 @@ class DesignSearch(ReadOnlyState, Plotted):
             row = problem.values(self.design(i))
             values = self.values(i).values()
             chosen = (v.shown(x) for v, x in zip(problem.variables, row, strict=True))
-            found = (m.shown(x) for m, x in zip(problem.measures, values, strict=True))
-            rows.append([f"{i}{'*' if i == self.compromise else ''}", *chosen, *found])
+            quantities = (m.shown(x) for m, x in zip(problem.measures, values, strict=True))
+            rows.append([f"{i}{'*' if i == self.compromise else ''}", *chosen, *quantities])
         return rows
 
 
@@ -215,8 +217,8 @@ def cable_table(arm: Manipulator) -> str:
     leads = [cable.lead for cable in arm.cables]
     lengths = np.column_stack([leads, straight, shortest, longest, longest - shortest])
     rows = [
-        [cable.name, route.joint, label(cable.elasticity), *map(_mm, own)]
-        for cable, route, own in zip(arm.cables, arm.geometry.cables, 1e3 * lengths, strict=True)
+        [cable.name, route.joint, label(cable.elasticity), *map(_mm, row)]
+        for cable, route, row in zip(arm.cables, arm.geometry.cables, 1e3 * lengths, strict=True)
     ]
     head = ["cable", "ends after joint", "wire", "lead [mm]", "straight [mm]", "shortest [mm]"]
     return csv_text([*head, "cut [mm]", "stroke [mm]"], rows)

@@ -56,7 +56,7 @@ def search_designs(
     whole_number("seed", seed, 0)
     need("design", "pymoo")
     rows: list[Array] = []
-    found: list[Measured] = []
+    results: list[Measured] = []
     with (
         workers(problem, jobs, progress, steps * size) as compute,
         warnings.catch_warnings(action="ignore"),  # pymoo and its parts warn of themselves
@@ -65,11 +65,11 @@ def search_designs(
         def evaluate(designs: Array) -> Designs:
             evaluated = [*compute(designs)]
             rows.extend(designs)
-            found.extend(evaluated)
+            results.extend(evaluated)
             return gathered(problem, designs, evaluated)
 
         _minimize(problem, evaluate, steps, size, seed)
-    return best_of(gathered(problem, np.array(rows), found), seed)
+    return best_of(gathered(problem, np.array(rows), results), seed)
 
 
 def _minimize(
@@ -101,7 +101,9 @@ def _minimize(
 
     class Task(Problem):  # type: ignore[misc]
         def _evaluate(self, x: Any, out: dict[str, Array], *_: Any, **__: Any) -> None:
-            designs = evaluate(np.array([[float(each[name]) for name in named] for each in x]))
+            designs = evaluate(
+                np.array([[float(individual[name]) for name in named] for individual in x])
+            )
             goals = designs.goals
             missed = np.nan_to_num(designs.violations, nan=_FAR, posinf=_FAR)
             missed[~np.isfinite(goals).all(axis=1), 0] += 1.0
@@ -111,9 +113,9 @@ def _minimize(
     task = Task(vars=named, n_obj=len(problem.objectives), n_ieq_constr=constraints)
     first = MixedVariableSampling()(task, population, random_state=np.random.default_rng(seed))
     if problem.start is not None:
-        given = dict(zip(named, problem.start.tolist(), strict=True))
-        given |= {name: round(given[name]) for name, x in named.items() if isinstance(x, Integer)}
-        first = Population.merge(Population.new(X=[given]), first[1:])
+        start = dict(zip(named, problem.start.tolist(), strict=True))
+        start |= {name: round(start[name]) for name, x in named.items() if isinstance(x, Integer)}
+        first = Population.merge(Population.new(X=[start]), first[1:])
     elimination = MixedVariableDuplicateElimination()
     algorithm = NSGA2(
         pop_size=population,

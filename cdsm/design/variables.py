@@ -77,7 +77,7 @@ class Variable:
             for wire in self.choices:
                 as_wire(wire)
         elif self.choices:
-            values = [scalar(f"{self.of}.choices", each) for each in self.choices]
+            values = [scalar(f"{self.of}.choices", choice) for choice in self.choices]
             if len(set(values)) < len(values):
                 raise InvalidInput(self.of, "names a choice twice.")
         else:
@@ -101,7 +101,7 @@ class Variable:
         if not low < high:
             raise InvalidInput(self.of, f"from {low:g} to {high:g} given; give low < high.")
         if self.kind in WHOLE:
-            low, high = (_whole(self.of, each) for each in (low, high))
+            low, high = (_whole(self.of, end) for end in (low, high))
         doubts = list[str]()
         if self.kind in ("hole_radius", "disk_offset"):
             doubts = doubts_about_units(0.0, [(self.of, high, WIDEST)])
@@ -161,9 +161,11 @@ class Variable:
     def require(self, arm: Manipulator) -> None:
         """Raise InvalidInput if an arm lacks the joint or the cable of this."""
         if self.kind == "cables_per_joint" and not all(x.axes for x in arm.geometry.joints):
-            said = f"{arm.name} has a backbone or necks, whose cables no rule spaces; vary "
+            problem = f"{arm.name} has a backbone or necks, whose cables no rule spaces; vary "
             first = arm.geometry.cable_names[0]
-            raise InvalidInput(self.of, f"{said}hole_angle@{first} or end@{first} of its cables.")
+            raise InvalidInput(
+                self.of, f"{problem}hole_angle@{first} or end@{first} of its cables."
+            )
         if self.kind == "end":
             one_of("cable", self.at, arm.geometry.cable_names)
             if not self.choices:
@@ -174,22 +176,22 @@ class Variable:
     def present(self, arm: Manipulator, minimum: float) -> float | None:
         """Return the value in an arm, the index of a choice; None if it has another or several."""
         geometry = arm.geometry
-        found: Sequence[object]
+        numbers: Sequence[object]
         match self.kind:
             case "end":
-                found = [geometry.cables[geometry.cable_names.index(self.at)].joint]
+                numbers = [geometry.cables[geometry.cable_names.index(self.at)].joint]
             case "cables_per_joint":
                 joints = [cable.joint for cable in geometry.cables]
-                found = [joints.count(k + 1) for k in range(len(geometry.joints))]
+                numbers = [joints.count(k + 1) for k in range(len(geometry.joints))]
             case "minimum":  # where nothing asks for more, the least of the range will do
-                own = max(minimum, min(cable.minimum for cable in arm.cables))
-                found = [max(own, self.low or 0.0)]
+                least = max(minimum, min(cable.minimum for cable in arm.cables))
+                numbers = [max(least, self.low or 0.0)]
             case "wire":
                 laws = {cable.elasticity for cable in arm.cables}
-                found = [each for each in self.choices if {as_wire(each)} == laws][:1]
+                numbers = [wire for wire in self.choices if {as_wire(wire)} == laws][:1]
             case _:
-                found = ArmParameters(arm, (self.of,)).values(self.of)
-        values = {*found}
+                numbers = ArmParameters(arm, (self.of,)).values(self.of)
+        values = {*numbers}
         if len(values) != 1:
             return None
         (value,) = values
@@ -220,8 +222,8 @@ def changed(arm: Manipulator, values: dict[Variable, Value]) -> Manipulator:
         numbers[variable.of] = scalar(variable.of, value)
         if variable.kind == "link_length":
             links = base.geometry.links
-            own = [int(variable.at)] if variable.at else range(1, len(links) + 1)
-            for k in own:  # a link keeps its mass per length
+            changed_links = [int(variable.at)] if variable.at else range(1, len(links) + 1)
+            for k in changed_links:  # a link keeps its mass per length
                 mass = links[k - 1].mass * numbers[variable.of] / links[k - 1].length
                 numbers.setdefault(f"link_mass@{k}", mass)
     return _parameters(base, tuple(numbers))(**numbers) if numbers else base
@@ -251,7 +253,7 @@ def _rerouted(arm: Manipulator, values: tuple[tuple[Variable, Value], ...]) -> M
     like: Sequence[Cable] = arm.cables
     if len(routes) != len(like):
         joints = [route.joint for route in arm.geometry.cables]
-        firsts = [joints.index(each.joint) if each.joint in joints else 0 for each in routes]
+        firsts = [joints.index(route.joint) if route.joint in joints else 0 for route in routes]
         like = tuple(arm.cables[first] for first in firsts)
     routed = serpentine_cables(geometry, law or arm.cables[0].elasticity)
     cables = [

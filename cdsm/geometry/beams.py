@@ -31,8 +31,8 @@ class Beam:
         if self.bending_stiffness is not None and tube.count(None) < 2:
             return ["bending_stiffness: give it, or outer_diameter and youngs_modulus, not both"]
         if self.outer_diameter is not None and self.inner_diameter >= self.outer_diameter:
-            said = f"{self.inner_diameter:g} m given, not below outer_diameter"
-            return [f"inner_diameter: {said}, {self.outer_diameter:g} m"]
+            problem = f"{self.inner_diameter:g} m given, not below outer_diameter"
+            return [f"inner_diameter: {problem}, {self.outer_diameter:g} m"]
         return []
 
     def stiffness(self) -> dict[str, Any]:
@@ -51,8 +51,10 @@ def buckling_doubt(joints: Sequence[Joint]) -> str:
     """Return a sentence if a backbone or neck has one piece from disk to disk; else nothing."""
     if all(joint.axes or joint.pieces > 1 for joint in joints):
         return ""
-    said = "the backbone has one piece from disk to disk: it buckles by its own cables at 12 EI/d² "
-    return said + "in place of π² EI/d², 21.6 % too late. Build it with pieces=4: 1.7 % too early."
+    doubt = (
+        "the backbone has one piece from disk to disk: it buckles by its own cables at 12 EI/d² "
+    )
+    return doubt + "in place of π² EI/d², 21.6 % too late. Build it with pieces=4: 1.7 % too early."
 
 
 @records.record
@@ -80,12 +82,12 @@ class Section:
     disk_radius: records.Length | None = None
 
 
-def _section(given: object) -> Section:
-    if isinstance(given, dict):
-        return Section(**given)
-    if not isinstance(given, Section):
-        raise ValueError(f"{given!r:.60} given; a table is needed")
-    return given
+def _section(section: object) -> Section:
+    if isinstance(section, dict):
+        return Section(**section)
+    if not isinstance(section, Section):
+        raise ValueError(f"{section!r:.60} given; a table is needed")
+    return section
 
 
 @records.record
@@ -137,7 +139,7 @@ class Backbone(Beam):
         cables = list[CableRoute]()
         for section in sections:
             gap = section.length / section.disks
-            own = None if section.hole_radius == common else section.hole_radius
+            radius = None if section.hole_radius == common else section.hole_radius
             for _ in range(section.disks):
                 if links:  # from the middle of the gap before to the middle of this one
                     links[-1] = Link(length=links[-1].length + gap / 2.0, mass=links[-1].mass)
@@ -145,7 +147,7 @@ class Backbone(Beam):
                     Joint(
                         disk_offset=gap / 2.0,
                         limit=self.joint_limit,
-                        hole_radius=own,
+                        hole_radius=radius,
                         disk_radius=section.disk_radius,
                         mass=self.mass_per_length * gap,
                         **self.stiffness(),

@@ -94,34 +94,38 @@ class Chain:
         """Return what is wrong with the chain as a whole: too many joints."""
         if len(self.axes) <= _MOST_AXES:
             return []
-        said = f"joints: {len(self.axes)} axes with those of all pieces of beams; {_MOST_AXES} are "
-        said += "taken at most. Give fewer pieces or disks, or leave twist out: torsion_stiffness="
-        return [said + "inf"]
+        problem = (
+            f"joints: {len(self.axes)} axes with those of all pieces of beams; {_MOST_AXES} are "
+        )
+        problem += (
+            "taken at most. Give fewer pieces or disks, or leave twist out: torsion_stiffness="
+        )
+        return [problem + "inf"]
 
     def run(
         self,
         stem: str,
         length: float,
-        of: Joint | Link,
+        beam: Joint | Link,
         mass: float,
         end: str,
         limit: float,
         stops: bool,
     ) -> None:
         """Run along a beam of this length [m]; the body at its end is called ``end``."""
-        EI = of.bending_stiffness
-        GJ = of.torsion_stiffness
-        n = of.pieces
+        EI = beam.bending_stiffness
+        GJ = beam.torsion_stiffness
+        n = beam.pieces
         assert EI is not None
         GJ = EI / (1.0 + _POISSON) if GJ is None else GJ
         piece = length / n
-        each = mass / n * (1.0 - 2.0 * _OF_CROSS)
+        piece_mass = mass / n * (1.0 - 2.0 * _OF_CROSS)
         limit = limit / (2 * n)
         spring = (2.0 * EI / piece, 0.0)
 
         def go(part: float) -> None:
             self.x += part * piece
-            self.mass += part * each
+            self.mass += part * piece_mass
 
         def bend(name: str, cross: str, child: str, order: str, kind: str) -> None:
             ends = limit, stops, *spring
@@ -130,16 +134,16 @@ class Chain:
             self.turn(f"{name}_{order[1]}", _AXES[order[1]], child, kind, *ends)
 
         for p in range(1, n + 1):
-            own = stem if n == 1 else f"{stem}_{p}"
+            name = stem if n == 1 else f"{stem}_{p}"
             go(1.0 / 6.0)
-            bend(f"{own}_bend1", f"{own}_cross1", f"{own}_middle1", "yz", "beam")
+            bend(f"{name}_bend1", f"{name}_cross1", f"{name}_middle1", "yz", "beam")
             go(1.0 / 3.0)
             if math.isfinite(GJ):
                 ends = STEEPEST, False, GJ / piece, 0.0
-                self.turn(f"{own}_twist", _AXES["x"], f"{own}_middle2", "beam", *ends)
+                self.turn(f"{name}_twist", _AXES["x"], f"{name}_middle2", "beam", *ends)
             go(1.0 / 3.0)
-            last = (end, "link") if p == n else (f"{own}_end", "beam")
-            bend(f"{own}_bend2", f"{own}_cross2", last[0], "zy", last[1])
+            last = (end, "link") if p == n else (f"{name}_end", "beam")
+            bend(f"{name}_bend2", f"{name}_cross2", last[0], "zy", last[1])
             go(1.0 / 6.0)
 
 
@@ -162,14 +166,14 @@ def chain_of(
         after = joints[k] if k < len(joints) else None
         link = links[k - 1] if k else Link(length=max(base_length, _LEAST), mass=0.0)
         length = link.length if k else base_length
-        own = offsets[k - 1] if k else [0.0, 0.0]
-        start = _start(chain, k, joints[k - 1], link, sizes[k - 1], own) if k else 0.0
+        distances = offsets[k - 1] if k else [0.0, 0.0]
+        start = _start(chain, k, joints[k - 1], link, sizes[k - 1], distances) if k else 0.0
         h = offsets[k][0] if after else 0.0
         if link.bending_stiffness is None:
             chain.mass += link.mass
             chain.x = length - h - start
         else:
-            gap = length - h - own[1]
+            gap = length - h - distances[1]
             chain.run(f"link{k}b", gap, link, link.mass * gap / length, f"link{k}_end", *rigid)
         if after:
             chain.disk(k + 1, *sizes[k][:2])

@@ -85,10 +85,10 @@ class Geometry(Printed):
         """Check all parts together; joints keep only radii that differ from the common one."""
         radii = self.hole_radii
         common = self.hole_radius if self.hole_radius in radii else radii[0]
-        own = [None if common == R else R for R in radii]
+        radii_of_joints = [None if common == R else R for R in radii]
         joints = [
             joint if joint.hole_radius == R else replace(joint, hole_radius=R)
-            for joint, R in zip(self.joints, own, strict=True)
+            for joint, R in zip(self.joints, radii_of_joints, strict=True)
         ]
         self.__dict__.update(hole_radius=common, joints=tuple(joints))
         if faults := [*self._faults()] or self.chain.faults():
@@ -117,8 +117,8 @@ class Geometry(Printed):
             yield f"disk_offset: too large: {listed(short, 1, '; ')}; {remedy}"
         for c, cable in enumerate(self.cables, start=1):
             if cable.joint > n:
-                said = f"{cable.joint} is past the last joint, {n}; give 1 to {n}"
-                yield f"cables[{c}].joint: {said}"
+                problem = f"{cable.joint} is past the last joint, {n}; give 1 to {n}"
+                yield f"cables[{c}].joint: {problem}"
         for k, joint in enumerate(joints, start=1):
             leader = joints[joint.follows - 1] if joint.follows and joint.follows < k else None
             if joint.follows and (leader is None or leader.follows or not joint.axes):
@@ -191,7 +191,7 @@ class Geometry(Printed):
             begin = len(joints)
             if links:
                 links[-1] = replace(links[-1], length=links[-1].length + part.base_length)
-            cables += [replace(each, joint=each.joint + len(joints)) for each in part.cables]
+            cables += [replace(cable, joint=cable.joint + len(joints)) for cable in part.cables]
             joints += [
                 replace(
                     joint,

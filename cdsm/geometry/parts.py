@@ -147,10 +147,10 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
 
     bodies = []
     for link, pose in poses.items():
-        own = [disk for disk in disks if disk.link == link]
-        first = own[0].x
-        last = own[-1].x
-        shape = coal.Cylinder(max(disk.radius for disk in own), last - first)
+        disks_of_link = [disk for disk in disks if disk.link == link]
+        first = disks_of_link[0].x
+        last = disks_of_link[-1].x
+        shape = coal.Cylinder(max(disk.radius for disk in disks_of_link), last - first)
         centre = pose[:3, 3] + pose[:3, 0] * (first + last) / 2.0
         place = coal.Transform3s(np.roll(pose[:3, :3], -1, axis=1), centre)  # its z is the link's x
         bodies.append((link, coal.CollisionObject(shape, place)))

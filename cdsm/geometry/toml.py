@@ -26,11 +26,11 @@ def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
     ``cables`` belongs to the geometry beside ``joints`` or ``links``, and if it is the only key.
     """
     forms = [key for key in _FORMS if key in data]
-    own = {*_FORMS, *_keys_of("geometry")}.union(*map(_keys_of, forms)).difference(_OF_CABLES)
+    known = {*_FORMS, *_keys_of("geometry")}.union(*map(_keys_of, forms)).difference(_OF_CABLES)
     if data.keys() - {"cables"} and not data.keys() & {"joints", "links"}:
-        own.discard("cables")
-    geometry = {key: value for key, value in data.items() if key in own}
-    return geometry, {key: value for key, value in data.items() if key not in own}
+        known.discard("cables")
+    geometry = {key: value for key, value in data.items() if key in known}
+    return geometry, {key: value for key, value in data.items() if key not in known}
 
 
 def _keys_of(form: str) -> set[str]:

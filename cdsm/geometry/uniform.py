@@ -124,17 +124,17 @@ class Universal(Beam):
         """Return the fields of the :class:`~cdsm.Geometry` by name."""
         n = self.joints
         (axes, usual) = self._axes_and_angles()
-        own = self.hole_angles
-        given: Sequence[Any] = own or usual
-        angles = given if isinstance(given[0], Sequence) else [given] * n
+        angles: Sequence[Any] = self.hole_angles or usual
+        if not isinstance(angles[0], Sequence):
+            angles = [angles] * n
         values = [getattr(self, key) for key in _OF_JOINTS]
-        each = [value if isinstance(value, Sequence) else [value] * n for value in values]
+        columns = [value if isinstance(value, Sequence) else [value] * n for value in values]
         joints = list[Joint]()
         links = list[Link]()
         cables = list[CableRoute]()
-        common = each[1][0]
+        common = columns[1][0]
         beam = self.stiffness()
-        rows = zip(axes, angles, *each, strict=True)
+        rows = zip(axes, angles, *columns, strict=True)
         for axis, phis, h, R, r, top, length, mass, lead, mu, ring, phase, k, rest in rows:
             R = None if common == R else R
             spring = {"stiffness": k, "rest_angle": rest}

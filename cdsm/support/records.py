@@ -165,28 +165,28 @@ def parse(kind: type[_Record], data: object) -> _Record:
 def faults_at(where: str, error: ValueError) -> list[str]:
     """Return the fault, or faults, of a value, each after the key ``where`` of the value."""
     if several := getattr(error, "faults", ()):
-        return [f"{where}.{each}".lstrip(".").replace(".[", "[") for each in several]
-    own = f"{getattr(error, 'name', None)}: "  # the argument of an InvalidInput
-    return [f"{where}: {str(error).removeprefix(own)}"]
+        return [f"{where}.{fault}".lstrip(".").replace(".[", "[") for fault in several]
+    prefix = f"{getattr(error, 'name', None)}: "  # the argument of an InvalidInput
+    return [f"{where}: {str(error).removeprefix(prefix)}"]
 
 
 def _keys(kind: Any) -> set[str]:
     """Return the keys of a record and of its parts."""
-    own = get_type_hints(kind) if is_pydantic_dataclass(kind) else {}
-    return {*own}.union(*map(_keys, (*own.values(), *get_args(kind))))
+    hints = get_type_hints(kind) if is_pydantic_dataclass(kind) else {}
+    return {*hints}.union(*map(_keys, (*hints.values(), *get_args(kind))))
 
 
 def _faults(error: ValidationError, kind: Any) -> list[str]:
     listed: list[str] = []
     for fault in error.errors():
         # joints[2].limit counts from 1 like the names of joints and cables
-        parts = (each for each in fault["loc"] if each not in (ONE, EACH, "[key]"))
-        shown = (f"[{each + 1}]" if isinstance(each, int) else f".{each}" for each in parts)
+        parts = (part for part in fault["loc"] if part not in (ONE, EACH, "[key]"))
+        shown = (f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in parts)
         where = "".join(shown).lstrip(".")
         cause = fault.get("ctx", {}).get("error")
         if isinstance(cause, ValueError):
             listed += faults_at(where, cause)
-        elif fault["type"] == "too_short" and any(each.startswith(where) for each in listed):
+        elif fault["type"] == "too_short" and any(earlier.startswith(where) for earlier in listed):
             continue  # pydantic does not count faulty entries
         elif fault["type"].startswith("missing"):
             listed.append(f"{where}: is missing")
@@ -232,11 +232,11 @@ def toml_text(table: Mapping[str, Any]) -> str:
 
 def _written(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return {key: _written(each) for key, each in value.items() if each not in (None, {})}
+        return {key: _written(entry) for key, entry in value.items() if entry not in (None, {})}
     if not isinstance(value, (list, tuple)):
         return value
-    entries = [_written(each) for each in value]
-    numbers = entries and all(isinstance(each, (int, float)) for each in entries)
+    entries = [_written(entry) for entry in value]
+    numbers = entries and all(isinstance(entry, (int, float)) for entry in entries)
     return verbatim(f"[{', '.join(map(str, entries))}]") if numbers else entries
 
 
@@ -248,14 +248,14 @@ def laid_over(old: Any, new: Any, where: str = "") -> Any:
         known = old if isinstance(old, dict) else {}
         laid = {k: laid_over(known.get(k), value, f"{where}{k}.") for k, value in new.items()}
         return {**known, **laid}
-    entries = [each if isinstance(each, dict) else {} for each in old]
-    names = [str(each.get("name", i)) for i, each in enumerate(entries, start=1)]
+    entries = [entry if isinstance(entry, dict) else {} for entry in old]
+    names = [str(entry.get("name", i)) for i, entry in enumerate(entries, start=1)]
     unknown = [
         f"{where}{key}: there is only {listed(names, 12)}" for key in new if key not in names
     ]
     if unknown:
         raise GeometryError(unknown)
     return [
-        laid_over(each, new[name], f"{where}{name}.") if name in new else each
-        for name, each in zip(names, old, strict=True)
+        laid_over(entry, new[name], f"{where}{name}.") if name in new else entry
+        for name, entry in zip(names, old, strict=True)
     ]

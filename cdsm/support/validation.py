@@ -112,7 +112,7 @@ def instance(name: str, value: _Kind, kind: type[_Kind]) -> _Kind:
 
 def sequence_of(name: str, value: Iterable[_Kind], kind: type[_Kind]) -> tuple[_Kind, ...]:
     """Return a list or tuple of ``kind`` as a tuple; else raise :class:`InvalidInput`."""
-    if not isinstance(value, (list, tuple)) or not all(isinstance(each, kind) for each in value):
+    if not isinstance(value, (list, tuple)) or not all(isinstance(entry, kind) for entry in value):
         raise InvalidInput(name, f"{value!r} given; a list or tuple of {kind.__name__} is needed.")
     return tuple(value)
 
@@ -214,7 +214,7 @@ def _native(name: str, value: ArrayLike) -> Array:
     except (TypeError, ValueError) as error:  # rows of different lengths
         raise InvalidInput(name, f"is not an array of numbers ({error}).") from None
     if array.dtype.kind not in "iuf":
-        such = "".join(f", such as {each!r:.60}" for each in array.ravel()[:1].tolist())
+        such = "".join(f", such as {entry!r:.60}" for entry in array.ravel()[:1].tolist())
         raise InvalidInput(name, f"holds {array.dtype} entries{such}; real numbers are needed.")
     return np.array(array, dtype=np.float64, order="C")
 
@@ -240,8 +240,8 @@ XYZ: Final = ("x", "y", "z")
 
 def unit_direction(name: str, value: Direction) -> Array:
     """Return the read-only unit vector (3,) along an axis or a vector that is not zero."""
-    given = axis_vector(name, value) if isinstance(value, str) else value
-    array = vector(name, given, 3, "a direction in base axes")
+    components = axis_vector(name, value) if isinstance(value, str) else value
+    array = vector(name, components, 3, "a direction in base axes")
     length = float(np.linalg.norm(array))
     if length == 0.0:
         raise InvalidInput(name, "is the zero vector; give a direction, such as (0, 0, 1).")
@@ -257,8 +257,10 @@ def axis_vector(name: str, axis: str) -> tuple[float, float, float]:
 
 def gravity_vector(name: str, value: Direction) -> Array:
     """Return gravity (3,) [m/s²], read-only, from a vector or an axis (9.81 m/s² along it)."""
-    given = 9.81 * np.array(axis_vector(name, value)) if isinstance(value, str) else value
-    return vector(name, given, 3, "gravity in base axes [m/s²], or an axis such as -z", "gravity")
+    components = 9.81 * np.array(axis_vector(name, value)) if isinstance(value, str) else value
+    return vector(
+        name, components, 3, "gravity in base axes [m/s²], or an axis such as -z", "gravity"
+    )
 
 
 def unit_directions(name: str, value: Direction | Iterable[Direction]) -> Array:
@@ -266,13 +268,13 @@ def unit_directions(name: str, value: Direction | Iterable[Direction]) -> Array:
     rows: Any = value
     if isinstance(rows, str):
         return unit_direction(name, rows)
-    if not (isinstance(rows, (list, tuple)) and any(isinstance(each, str) for each in rows)):
+    if not (isinstance(rows, (list, tuple)) and any(isinstance(row, str) for row in rows)):
         rows = number_array(name, rows)
         if rows.ndim < 2:
             return unit_direction(name, rows)
         if rows.ndim > 2 or rows.shape[1] != 3 or not len(rows):
             raise InvalidInput(name, f"shape {rows.shape} given, (3,) or (n, 3) needed.")
-    return frozen(np.array([unit_direction(f"{name}[{i}]", each) for i, each in enumerate(rows)]))
+    return frozen(np.array([unit_direction(f"{name}[{i}]", row) for i, row in enumerate(rows)]))
 
 
 # a longer arm, a larger hole radius or disk offset than this [m] was probably given in millimetres

@@ -82,13 +82,13 @@ class Uncertainty(Result, Plotted):
 
         They are central differences, in the unit of the value per [-], [rad], [m], [N] or [kg].
         """
-        found = {}
-        for source, given in self.tolerances.given.items():
-            most = max(given, key=lambda each: each.standard)
+        derivatives = {}
+        for source, tolerances in self.tolerances.given.items():
+            most = max(tolerances, key=lambda tolerance: tolerance.standard)
             inputs = np.arange(len(self.measurand.inputs.labels[source]))[:, None]
-            groups = [Group(source, each, most) for each in inputs]
-            found[source] = frozen(_differences(self.measurand, groups, {})[0][:, 0])
-        return found
+            groups = [Group(source, number, most) for number in inputs]
+            derivatives[source] = frozen(_differences(self.measurand, groups, {})[0][:, 0])
+        return derivatives
 
     def interval(self, probability: float = 0.95) -> tuple[float, float]:
         """Return the coverage interval value ± k u_c, with k of the normal distribution.
@@ -105,8 +105,8 @@ class Uncertainty(Result, Plotted):
         (unit, size) = self.measurand.unit
         relative = 100.0 * self.relative
         low, high = (end / size for end in self.interval())
-        own = "its own least tensions" if self.measurand.redistribute else "the tensions given"
-        with_them = "" if self.measurand.quantity.needs == "posture" else f", each with {own}"
+        tensions = "its own least tensions" if self.measurand.redistribute else "the tensions given"
+        with_them = "" if self.measurand.quantity.needs == "posture" else f", each with {tensions}"
         lines = [
             *self._unstable,
             f"{self.name}: {self.shown} {unit} (one standard uncertainty, {relative:.2g} %)",
@@ -115,7 +115,7 @@ class Uncertainty(Result, Plotted):
         ]
         for source, u in self.contributions.items():
             shown, scale = _unit_of_errors(source)
-            errors = np.array([each.standard for each in self.tolerances.given[source]])
+            errors = np.array([one.standard for one in self.tolerances.given[source]])
             tolerance = f"{span(errors / scale, '{:.3g}'.format)} {shown}".rstrip()
             share = 100.0 * (u / (self.standard_uncertainty or 1.0)) ** 2
             line = f"{source:<16}{tolerance:>16}{u / size:>24.3g}{share:>12.3g} %"
@@ -147,8 +147,8 @@ class Uncertainty(Result, Plotted):
         if not self.failed:
             part = f"up to {far:.2g} % larger or smaller"
             why = f"the uncertainty may be {part if far < 100.0 else 'several times as large'}"
-        said = f"first order is not enough here: {why}; use Monte Carlo (cdsm.monte_carlo)"
-        return () if self.is_linear else (said,)
+        warning = f"first order is not enough here: {why}; use Monte Carlo (cdsm.monte_carlo)"
+        return () if self.is_linear else (warning,)
 
     def _units(self) -> dict[str, str]:
         return {"measurand": self.measurand.si_unit}
@@ -213,18 +213,18 @@ def uncertainty(
 
 def budget_of(measurand: Measurand, tolerances: Tolerances | None) -> Uncertainty:
     """Compute the budget of a measurand; ``tolerances`` are as for :func:`uncertainty`."""
-    own = measurand.stiffness.posture.arm.tolerances
+    used = measurand.stiffness.posture.arm.tolerances
     if tolerances is not None:
-        own = instance("tolerances", tolerances, Tolerances)
-    elif not own.given:
-        said = "none given, and the arm has none; give Tolerances(rigidity=0.05, …), or a table "
-        raise InvalidInput("tolerances", said + "[tolerances] in its file.")
-    groups = measurand.inputs.groups(own)
+        used = instance("tolerances", tolerances, Tolerances)
+    elif not used.given:
+        problem = "none given, and the arm has none; give Tolerances(rigidity=0.05, …), or a table "
+        raise InvalidInput("tolerances", problem + "[tolerances] in its file.")
+    groups = measurand.inputs.groups(used)
     (value,) = measurand.value().tolist()
     if measurand.direction is not None and math.isinf(value):
-        said = "the tip cannot move in this direction: its stiffness is infinite, and has no "
-        said += "uncertainty. Choose another direction, or bend the arm."
-        raise SingularStiffness(said, measurand.direction)
+        problem = "the tip cannot move in this direction: its stiffness is infinite, and has no "
+        problem += "uncertainty. Choose another direction, or bend the arm."
+        raise SingularStiffness(problem, measurand.direction)
     drawn = measurand.inputs.draw(groups, np.random.default_rng(0), _DRAWN)
     variances, left, status = propagate(measurand, groups, drawn)
     parts = {source: math.sqrt(variance[0]) for source, variance in variances.items()}
@@ -233,7 +233,7 @@ def budget_of(measurand: Measurand, tolerances: Tolerances | None) -> Uncertaint
     scale = max(u, _ROUNDING * abs(value)) or 1.0
     return Uncertainty(
         measurand=measurand,
-        tolerances=own,
+        tolerances=used,
         value=value,
         standard_uncertainty=u,
         contributions=dict(sorted(parts.items(), key=lambda part: -part[1])),
@@ -254,15 +254,15 @@ def propagate(
     variances: dict[str, Array] = {}
     left = values - measurand.value()
     end = 0
-    for (source, _, tolerance), own in zip(groups, alone, strict=True):
+    for (source, _, tolerance), parts in zip(groups, alone, strict=True):
         u = tolerance.standard
         rho = tolerance.correlation
-        g = slopes[end : end + len(own)]
-        end = end + len(own)
+        g = slopes[end : end + len(parts)]
+        end = end + len(parts)
         variance = u**2 * ((1.0 - rho) * (g**2).sum(axis=0) + rho * g.sum(axis=0) ** 2)
         variances[source] = variances.get(source, 0.0) + variance
         if drawn:
-            left = left - drawn[source][:, [each.inputs[0] for each in own]] @ g
+            left = left - drawn[source][:, [part.inputs[0] for part in parts]] @ g
     return variances, left, status
 
 
@@ -278,7 +278,7 @@ def _differences(
     labels = measurand.inputs.labels
     step = _STEP * np.array([group.tolerance.standard for group in groups])
     arms = 2 * m + len(next(iter(drawn.values()), ()))
-    found = np.zeros((arms, value.size))
+    values = np.zeros((arms, value.size))
     status = np.zeros(arms, dtype=np.uint8)
     sources = {*drawn, *(group.source for group in groups)}
     for rows in np.split(np.arange(arms), range(_ROWS, arms, _ROWS)) if groups else ():
@@ -287,14 +287,14 @@ def _differences(
             group = groups[arm % m]
             size = step[arm % m]
             errors[group.source][row, group.inputs] = size if arm < m else -size
-        for source, each in drawn.items():
-            errors[source][rows >= 2 * m] = each[rows[rows >= 2 * m] - 2 * m]
-        found[rows], status[rows] = measurand.of_arms(errors)
+        for source, drawn_errors in drawn.items():
+            errors[source][rows >= 2 * m] = drawn_errors[rows[rows >= 2 * m] - 2 * m]
+        values[rows], status[rows] = measurand.of_arms(errors)
     exist = (status[: 2 * m] == Status.OK).reshape(2, m, 1)
     for n in np.flatnonzero(~exist.any(axis=0)).tolist():
         name = labels[groups[n].source][groups[n].inputs[0]]
         state = Status(status[n]).name
-        said = f"with a small error of {name} the arm is {state}: there is no budget by it."
-        raise InvalidInput(groups[n].source, f"{said} Change the tensions, or leave it out.")
-    up, down = np.where(exist, found[: 2 * m].reshape(2, m, value.size), value)
-    return (up - down) / (step[:, None] * exist.sum(axis=0)), found[2 * m :], status[2 * m :]
+        problem = f"with a small error of {name} the arm is {state}: there is no budget by it."
+        raise InvalidInput(groups[n].source, f"{problem} Change the tensions, or leave it out.")
+    up, down = np.where(exist, values[: 2 * m].reshape(2, m, value.size), value)
+    return (up - down) / (step[:, None] * exist.sum(axis=0)), values[2 * m :], status[2 * m :]

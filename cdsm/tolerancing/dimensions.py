@@ -27,7 +27,7 @@ _STEP = 1e-3  # of differences, over the smallest offset of a disk
 def changes_of_holes(arm: Manipulator, sites: Sequence[str], start: int) -> Iterator[Change]:
     """Yield what moves holes in their disk; ``start`` is the place of the first site."""
     links = {disk.link for disk in arm.geometry.disks}
-    for p, own in enumerate(own for cable in arm.cables for own in cable.sites):
+    for p, own in enumerate(site for cable in arm.cables for site in cable.sites):
         _, y, z = own.position
         if own.link in links and (radius := math.hypot(y, z)):
             at = start + 3 * p + np.array([1, 2])
@@ -59,7 +59,7 @@ def changes_of_chain(arm: Manipulator, starts: Mapping[str, int]) -> Iterator[Ch
         moved: Mapping[tuple[int, int], float], longer: int = 0, heavier: int = 0
     ) -> tuple[NDArray[np.intp], Array]:
         step = _STEP * min(h)
-        found = []
+        numbers = []
         for way in (step, -step):
             offsets = [[x, x] for x in h]
             parts: dict[str, list[Any]] = {"joints": [*joints], "links": [*links]}
@@ -68,14 +68,16 @@ def changes_of_chain(arm: Manipulator, starts: Mapping[str, int]) -> Iterator[Ch
             if longer:
                 link = links[longer - 1]
                 parts["links"][longer - 1] = replace(link, length=link.length + way)
-            for each in parts.values() if heavier else ():
-                own = each[heavier - 1]
-                each[heavier - 1] = replace(own, mass=own.mass * (1.0 + math.copysign(0.5, way)))
+            for group in parts.values() if heavier else ():
+                heavy = group[heavier - 1]
+                group[heavier - 1] = replace(
+                    heavy, mass=heavy.mass * (1.0 + math.copysign(0.5, way))
+                )
             sizes = [(0.0, 0.0, 0.0)] * len(joints)
-            found.append(
+            numbers.append(
                 read(chain_of(geometry.base_length, **parts, sizes=sizes, offsets=offsets))
             )
-        change = (found[0] - found[1]) / (1.0 if heavier else 2.0 * step)
+        change = (numbers[0] - numbers[1]) / (1.0 if heavier else 2.0 * step)
         some = np.flatnonzero(change)
         return rows[some], change[some]
 
@@ -105,8 +107,12 @@ def _numbers(
     places = dict[str, list[tuple[int, float]]]()
     for d, disk in enumerate(chain.disks):
         places.setdefault(disk.link, []).append((d, disk.x))
-    own = enumerate(site for cable in arm.cables for site in cable.sites)
-    near = [(p, d, x - site.position[0]) for p, site in own for d, x in places.get(site.link, ())]
+    cable_sites = enumerate(site for cable in arm.cables for site in cable.sites)
+    near = [
+        (p, d, x - site.position[0])
+        for p, site in cable_sites
+        for d, x in places.get(site.link, ())
+    ]
     sites, of_sites = (
         np.array([(p, d) for p, d, x in near if abs(x) <= _NEAR], np.intp).reshape(-1, 2).T
     )

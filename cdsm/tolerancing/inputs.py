@@ -42,7 +42,7 @@ class Group(NamedTuple):
     def split(self) -> list[Group]:
         """Return groups of inputs with one error each: each input, or all together if ρ = 1."""
         alone = self.inputs[:, None] if self.tolerance.correlation < 1.0 else [self.inputs]
-        return [self._replace(inputs=each) for each in alone]
+        return [self._replace(inputs=inputs) for inputs in alone]
 
 
 class Inputs:
@@ -67,12 +67,14 @@ class Inputs:
         every = *self._nominal[:-1], softness
         self._parts = np.cumsum([x.size for x in every[:-1]])
         self._numbers = np.concatenate([x.ravel() for x in every])
-        of = np.repeat(range(len(cables)), [len(c.sites) for c in cables])
+        cable_of_site = np.repeat(range(len(cables)), [len(c.sites) for c in cables])
         row = arm.routing.row
-        self._first = np.flatnonzero((of[1:] == of[:-1]) & (row[1:] == row[:-1]))
-        self._of_cable = np.eye(len(cables))[of[self._first]]
-        each = [(c.name, i, site) for c in cables for i, site in enumerate(c.sites, 1)]
-        sites = [f"{name} on {site.link}, site {i}" for name, i, site in each]
+        self._first = np.flatnonzero(
+            (cable_of_site[1:] == cable_of_site[:-1]) & (row[1:] == row[:-1])
+        )
+        self._of_cable = np.eye(len(cables))[cable_of_site[self._first]]
+        holes = [(c.name, i, site) for c in cables for i, site in enumerate(c.sites, 1)]
+        sites = [f"{name} on {site.link}, site {i}" for name, i, site in holes]
         slides = list(compress(arm.joint_names, arm.slides))
         self.labels: dict[str, Sequence[str]] = {
             "rigidity": cables.names,
@@ -81,15 +83,15 @@ class Inputs:
             "joint_angle": [name for name in arm.joint_names if name not in slides],
             "joint_position": slides,
             "tension": cables.names,
-            "friction": [name for name, e in zip(sites, each, strict=True) if e[2].friction],
+            "friction": [name for name, e in zip(sites, holes, strict=True) if e[2].friction],
         }
-        found: dict[str, list[Change]] = {}
+        changes_of: dict[str, list[Change]] = {}
         for change in _changes(arm, sites):
-            found.setdefault(change[0], []).append(change)
+            changes_of.setdefault(change[0], []).append(change)
         self._maps = {}
-        for source, changes in found.items():
+        for source, changes in changes_of.items():
             _, self.labels[source], rows, values = zip(*changes, strict=True)
-            columns = np.repeat(range(len(rows)), [len(each) for each in rows])
+            columns = np.repeat(range(len(rows)), [len(holes) for holes in rows])
             entries = np.concatenate(values), (np.concatenate(rows), columns)
             self._maps[source] = csr_matrix(entries, (self._numbers.size, len(rows)))
 
@@ -106,9 +108,9 @@ class Inputs:
     def bodies(self, errors: Errors, count: int) -> BodyArrays:
         """Return the dimensions of ``count`` arms with ``errors``."""
         numbers = self._numbers[:, None]
-        for source, each in self._maps.items():
+        for source, matrix in self._maps.items():
             if source in errors:
-                numbers = numbers + each @ errors[source].T
+                numbers = numbers + matrix @ errors[source].T
         numbers = np.broadcast_to(numbers, (len(numbers), count)).T
         *parts, softness = np.split(numbers, self._parts, axis=1)
         springs = 1.0 / softness
@@ -127,31 +129,34 @@ class Inputs:
         Raises InvalidInput if the arm has no inputs of a source or none with the name that a
         tolerance gives, if two tolerances belong to one input, or if a length is too uncertain.
         """
-        found = []
+        groups = []
         arm, most = self._arm
         known = sources()
-        for source, given in tolerances.given.items():
+        for source, parts in tolerances.given.items():
             names = self.labels.get(source, ())
             taken = np.zeros(0, dtype=np.intp)
             if not names:
-                said = self._lacks.get(source, f"{arm} {_LACKS.get(source, _NO_HOLES)}")
-                raise InvalidInput(source, said)
-            for each in given:
-                if known[source].unit.si == "m" and each.standard > most:
-                    said = f"a standard uncertainty of {each.standard:g} m given; up to {_LARGEST} "
-                    said += f"of the arm's length, {most:.2g} m, is a tolerance. It is in m."
-                    raise InvalidInput(source, said)
-                fits = [each.of == EVERY or fnmatchcase(name, each.of) for name in names]
-                own = np.flatnonzero(fits)
-                if not own.size:
-                    said = f"no input is called {each.of!r}; the first of {len(names)} is"
-                    raise InvalidInput(source, f"{said} {names[0]!r}.")
-                if (twice := np.intersect1d(taken, own)).size:
-                    said = f"{names[twice[0]]} has two tolerances; {each.of!r} is the second."
-                    raise InvalidInput(source, said)
-                taken = np.append(taken, own)
-                found.append(Group(source, own, each))
-        return tuple(found)
+                problem = self._lacks.get(source, f"{arm} {_LACKS.get(source, _NO_HOLES)}")
+                raise InvalidInput(source, problem)
+            for tolerance in parts:
+                if known[source].unit.si == "m" and tolerance.standard > most:
+                    problem = f"a standard uncertainty of {tolerance.standard:g} m given; up to "
+                    problem += f"{_LARGEST} of the arm's length, {most:.2g} m, is a tolerance. It "
+                    problem += "is in m."
+                    raise InvalidInput(source, problem)
+                fits = [tolerance.of == EVERY or fnmatchcase(name, tolerance.of) for name in names]
+                chosen = np.flatnonzero(fits)
+                if not chosen.size:
+                    problem = f"no input is called {tolerance.of!r}; the first of {len(names)} is"
+                    raise InvalidInput(source, f"{problem} {names[0]!r}.")
+                if (twice := np.intersect1d(taken, chosen)).size:
+                    problem = (
+                        f"{names[twice[0]]} has two tolerances; {tolerance.of!r} is the second."
+                    )
+                    raise InvalidInput(source, problem)
+                taken = np.append(taken, chosen)
+                groups.append(Group(source, chosen, tolerance))
+        return tuple(groups)
 
     def draw(
         self, groups: Sequence[Group], rng: np.random.Generator, draws: int

@@ -72,7 +72,7 @@ class MonteCarlo(Result, Plotted):
         """
         drawn = [*_draws(self.budget, self.seed, self.status.size)]
         fine = self.status == Status.OK
-        return {name: np.concatenate([each[name] for each in drawn])[fine] for name in drawn[0]}
+        return {name: np.concatenate([block[name] for block in drawn])[fine] for name in drawn[0]}
 
     def interval(self, probability: float = 0.95) -> tuple[float, float]:
         """Return the interval (low, high) that contains the fraction ``probability`` of the values.
@@ -165,16 +165,16 @@ def monte_carlo(
     status = []
     with progress_bar("Monte Carlo", count, wanted=wanted) as advance:
         for errors in _draws(budget, start, count):
-            found, codes = budget.measurand.of_arms(errors, checked_threads(None))
-            values.append(found[codes == Status.OK, 0])
+            numbers, codes = budget.measurand.of_arms(errors, checked_threads(None))
+            values.append(numbers[codes == Status.OK, 0])
             status.append(codes)
             advance(codes.size)
     exist = np.concatenate(values)
     codes = np.concatenate(status)
     if exist.size < count / 2:
         worst = Status(int(np.bincount(codes[codes != Status.OK]).argmax())).name
-        said = f"the {budget.name} exists for {exist.size} of {count} draws; most others are "
-        raise InvalidInput("tolerances", f"{said}{worst}. Lower them, or change the tensions.")
+        problem = f"the {budget.name} exists for {exist.size} of {count} draws; most others are "
+        raise InvalidInput("tolerances", f"{problem}{worst}. Lower them, or change the tensions.")
     return MonteCarlo(budget=budget, values=frozen(exist), status=frozen(codes), seed=start)
 
 
@@ -184,4 +184,4 @@ def _draws(budget: Uncertainty, seed: int, count: int) -> Iterator[dict[str, Arr
     groups = inputs.groups(budget.tolerances)
     for block, first in enumerate(range(0, count, _BLOCK)):
         drawn = inputs.draw(groups, np.random.default_rng([seed, block]), _BLOCK)
-        yield {source: each[: count - first] for source, each in drawn.items()}
+        yield {source: numbers[: count - first] for source, numbers in drawn.items()}

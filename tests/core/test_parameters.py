@@ -220,7 +220,7 @@ def test_files_hold_slack_and_gain(tmp_path: Path) -> None:
         (ARM, ("bending_stiffness",), "no backbone"),
         (ROD, ("joint_stiffness",), "free the bending_stiffness"),
         (ROD, ("slack@2",), "no cable that ends there"),
-        (SPRUNG.with_springs({"joint1_1": 4.0}), ("joint_stiffness",), "springs of the arm"),
+        (SPRUNG.with_springs({"joint1_1": 4.0}), ("joint_stiffness",), "its springs are not"),
         (
             cdsm.Manipulator.from_urdf(ARM.urdf, ARM.cables, tip="tool0"),
             ("lead",),
