@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
@@ -25,6 +26,7 @@ from cdsm.support.validation import (
     vector,
 )
 from cdsm.support.values import Array
+from cdsm.wires.catalogue import label
 from cdsm.wires.elasticity import Elasticity, checked_law
 
 Control = Literal["position", "force"]
@@ -291,3 +293,15 @@ def require_own_cables(geometry: Geometry, cables: Sequence[Cable]) -> None:
 
 def _path(cable: Cable) -> tuple[float, list[tuple[str, tuple[float, ...]]]]:
     return cable.lead, [(site.link, tuple(site.position)) for site in cable.sites]
+
+
+def wires_text(cables: Sequence[Cable]) -> str:
+    """Describe the wires of cables and their series springs; more than three kinds are counted."""
+    counts = Counter[str]()
+    for cable in cables:
+        spring = f" on a spring of {cable.series_stiffness / 1e3:.4g} N/mm"
+        counts[label(cable.elasticity) + spring * math.isfinite(cable.series_stiffness)] += 1
+    if len(counts) > 3:
+        return f"of {len(counts)} kinds"
+    texts = [f"{name} ({count} of {len(cables)})" for name, count in counts.items()]
+    return ", ".join(texts if len(counts) > 1 else counts)

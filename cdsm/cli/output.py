@@ -78,9 +78,9 @@ def header(
     that of ``tension``, or else the larger of it and the cable's own. ``friction`` says what
     becomes of the arm's friction.
     """
+    from cdsm.cable import wires_text
     from cdsm.support.format import coordinates, place, span, without_rounding
     from cdsm.tension import checked_bounds
-    from cdsm.wires.catalogue import wires_text
 
     arm = subject.arm if isinstance(subject, cdsm.Posture) else subject
     held = [checked_bounds(arm, low, math.inf)[0] for low in minimum]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, final
 
 import numpy as np
 
+from cdsm.cable import wires_text
 from cdsm.manipulator import Manipulator
 from cdsm.measures.indices import principal_stiffness
 from cdsm.plots.style import MM, N_PER_MM
@@ -19,7 +20,6 @@ from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.values import Array
 from cdsm.view.scene import ELLIPSOID, FORCE, SLIDES, STICKS, Scene
 from cdsm.view.state import Color, Setting, Shown
-from cdsm.wires.catalogue import wires_text
 
 if TYPE_CHECKING:
     import viser

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeGuard
+from typing import Any, Final, TypeGuard
 
 from cdsm.errors import LINES, FileError, GeometryError, InvalidInput, did_you_mean, listed
 from cdsm.support.files import read_text, write_text
@@ -16,9 +14,6 @@ from cdsm.support.records import read_toml, toml_text
 from cdsm.support.validation import flag, one_of
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity, StrandElasticity, TabulatedElasticity
-
-if TYPE_CHECKING:
-    from cdsm.cable import Cable
 
 STRAND: Final = StrandElasticity.eq19_repaired()
 """The paper's 1×19 steel strand of 1.2 mm (Section IV-C): Eq. 19, repaired and continuous."""
@@ -126,15 +121,3 @@ def label(law: Elasticity) -> str:
     text += f", EA times {law.factor:.6g}" if law.factor != 1.0 else ""
     branch = f", with a slack branch of EA {law.rigidity(law.low):.4g} N below {law.rest:.4g} N"
     return text + branch * (law.low < law.rest)
-
-
-def wires_text(cables: Sequence[Cable]) -> str:
-    """Describe the wires of cables and their series springs; more than three kinds are counted."""
-    counts = Counter[str]()
-    for cable in cables:
-        spring = f" on a spring of {cable.series_stiffness / 1e3:.4g} N/mm"
-        counts[label(cable.elasticity) + spring * math.isfinite(cable.series_stiffness)] += 1
-    if len(counts) > 3:
-        return f"of {len(counts)} kinds"
-    texts = [f"{name} ({count} of {len(cables)})" for name, count in counts.items()]
-    return ", ".join(texts if len(counts) > 1 else counts)
