@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from cdsm.errors import UnreachableStiffness
 from cdsm.planning.range import AT_END, End, downhill, ends, farther
-from cdsm.planning.tension_space import Bounds, TensionSpace
+from cdsm.planning.tension_space import Limits, TensionSpace
 from cdsm.support.values import Array
 from cdsm.tension import advice
 
@@ -19,9 +19,9 @@ REACHED: Final = 1e-6
 """Largest relative miss with which a target counts as hit; most searches come much nearer."""
 
 _CORNERS = 12  # number of random directions in which corners are sought
-_ENOUGH = 2  # number of lines beyond the corners that hit the target
-_STARTS = 5  # number of starts on lines, and at the least corners, if the first fails
-_LEAST = 2
+_CROSSINGS = 2  # number of lines beyond the corners that hit the target
+_STARTS = 5  # number of starts on lines, if the search from the anchor fails
+_LEAST = 2  # number of starts at the corners with the least tensions
 _SEARCHES = 3  # largest number of searches from each start
 
 
@@ -48,7 +48,7 @@ class Goal:
         return F is not None and self.space.reserve(F) > -REACHED and self.misfit(F) <= REACHED
 
     def search(
-        self, start: Array, bounds: Bounds | None = None, centre: Array | float = 0.0
+        self, start: Array, bounds: Limits | None = None, centre: Array | float = 0.0
     ) -> Array | None:
         """Search from ``start`` for the tensions nearest to ``centre`` that meet the goal, locally.
 
@@ -63,19 +63,19 @@ class Goal:
 
         rule = "ineq" if self.at_least else "eq", self.misses
         best = None
-        known = math.inf
-        missed = math.inf
+        least_effort = math.inf
+        misfit = math.inf
         for _ in range(_SEARCHES):
             F = self.space.search(start, effort, rule, bounds=bounds)
-            if F is None or (self.met(F) and effort(F)[0] > (1.0 - REACHED) * known):
+            if F is None or (self.met(F) and effort(F)[0] > (1.0 - REACHED) * least_effort):
                 break
             if self.met(F):
                 best = F
-                known = effort(F)[0]
-            elif self.misfit(F) > missed / 2.0:
+                least_effort = effort(F)[0]
+            elif self.misfit(F) > misfit / 2.0:  # it hardly comes nearer
                 break
             start = F
-            missed = self.misfit(F)
+            misfit = self.misfit(F)
         return best
 
     def least(self) -> Array:
@@ -88,38 +88,47 @@ class Goal:
         is raised if the arm is stable nowhere.
         """
         space = self.space
-        if (found := self.search(space.anchor)) is not None:
-            return found
+        # 1. one local search from the anchor, which is enough for most targets
+        optimum = self.search(space.anchor)
+        if optimum is not None:
+            return optimum
         corners = sorted(space.corners(_CORNERS), key=self.misfit)
         if self.targets.size > 1:
-            starts = [space.anchor, *corners[:_STARTS]]
-            near = [F for F in map(self.nearest, starts) if F is not None]
-            best = min([*starts, *near], key=self.misfit)
-            found = self.search(best) if self.met(best) else None
-            return best if found is None else found
-        lines = self._crossings(space.anchor, corners) or self._beyond(corners)
-        found = self._best([*lines[:_STARTS], *sorted(corners, key=_effort)[:_LEAST]])
-        if found is not None:
-            return found
-        low, high = ends(space)
-        if (1.0 - REACHED) * low.value <= self.targets[0] <= (1.0 + REACHED) * high.value:
-            both = [low.F, high.F]
-            lines = [*self._crossings(low.F, corners), *self._crossings(space.anchor, both)]
-            found = self._best([*both, *lines])
-        if found is None:
-            raise self._unreachable(low, high)
-        return found
+            return self._nearest_to_all([space.anchor, *corners[:_STARTS]])
+        # 2. tensions that hit the target exactly, on lines from the anchor, are feasible starts
+        crossings = self._crossings(space.anchor, corners) or self._crossings_beyond(corners)
+        optimum = self._least_of([*crossings[:_STARTS], *sorted(corners, key=_effort)[:_LEAST]])
+        if optimum is not None:
+            return optimum
+        # 3. the ends of the range tell whether the target can be reached at all
+        softest, stiffest = ends(space)
+        if (1.0 - REACHED) * softest.value <= self.targets[0] <= (1.0 + REACHED) * stiffest.value:
+            range_ends = [softest.F, stiffest.F]
+            crossings = self._crossings(softest.F, corners)
+            crossings += self._crossings(space.anchor, range_ends)
+            optimum = self._least_of([*range_ends, *crossings])
+        if optimum is None:
+            raise self._unreachable(softest, stiffest)
+        return optimum
 
-    def _beyond(self, corners: list[Array]) -> list[Array]:
+    def _nearest_to_all(self, starts: list[Array]) -> Array:
+        """Return the tensions with the least sum of squared misses of several targets."""
+        fits = [F for F in map(self.nearest, starts) if F is not None]
+        best = min([*starts, *fits], key=self.misfit)
+        least = self.search(best) if self.met(best) else None
+        return best if least is None else least
+
+    def _crossings_beyond(self, corners: list[Array]) -> list[Array]:
         """Return where lines from the anchor to what searches from corners find hit the target."""
         sign = -float(np.sign(self.misses(self.space.anchor)[0][0]))
-        found = list[Array]()
-        for F in corners:
-            end = farther(self.space, -sign, downhill(self.space, F) if sign < 0.0 else F)
-            found += self._crossings(self.space.anchor, [end])
-            if len(found) == _ENOUGH:
+        crossings = list[Array]()
+        for corner in corners:
+            start = downhill(self.space, corner) if sign < 0.0 else corner
+            optimum = farther(self.space, -sign, start)
+            crossings += self._crossings(self.space.anchor, [optimum])
+            if len(crossings) == _CROSSINGS:
                 break
-        return found
+        return crossings
 
     def _unreachable(self, low: End, high: End) -> UnreachableStiffness:
         space = self.space
@@ -134,7 +143,7 @@ class Goal:
         nearest = [first, last] if first <= target <= last else [end.value]
         return UnreachableStiffness(u, target, first, last, nearest, hint)
 
-    def nearest(self, start: Array, bounds: Bounds | None = None) -> Array | None:
+    def nearest(self, start: Array, bounds: Limits | None = None) -> Array | None:
         """Search once for the tensions (C,) [N] with the least sum of squared misses, if any."""
 
         def miss(F: Array) -> tuple[float, Array]:
@@ -145,27 +154,27 @@ class Goal:
         F = self.space.search(start, miss, bounds=bounds)
         return None if F is None else self.space.pulled_back(F)
 
-    def _best(self, starts: list[Array]) -> Array | None:
+    def _least_of(self, starts: list[Array]) -> Array | None:
         """Return the least tensions that searches find, until two find the same, or the starts."""
-        ends: list[Array] = []
+        optima: list[Array] = []
         for start in starts:
-            both = [F for F in (self.search(start), start) if F is not None and self.met(F)]
-            ends = sorted([*ends, *sorted(both, key=_effort)[:1]], key=_effort)
-            if len(ends) > 1 and _effort(ends[1]) < (1.0 + REACHED) * _effort(ends[0]):
+            candidates = [F for F in (self.search(start), start) if F is not None and self.met(F)]
+            optima = sorted([*optima, *sorted(candidates, key=_effort)[:1]], key=_effort)
+            if len(optima) > 1 and _effort(optima[1]) < (1.0 + REACHED) * _effort(optima[0]):
                 break
-        return ends[0] if ends else None
+        return optima[0] if optima else None
 
     def _crossings(self, hub: Array, points: list[Array]) -> list[Array]:
         """Return where the lines from ``hub`` to ``points`` hit the only target, least first."""
-        found = []
+        crossings = []
 
         def miss(part: float, way: Array) -> float:
             return float(self.misses(hub + part * way)[0][0])
 
         for way in points - hub:
             if miss(0.0, way) * miss(1.0, way) < 0.0:
-                found.append(hub + brentq(miss, 0.0, 1.0, args=(way,), xtol=1e-12) * way)
-        return sorted(found, key=_effort)
+                crossings.append(hub + brentq(miss, 0.0, 1.0, args=(way,), xtol=1e-12) * way)
+        return sorted(crossings, key=_effort)
 
 
 def _effort(F: Array) -> float:

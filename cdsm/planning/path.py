@@ -86,70 +86,85 @@ def plan_path(
     limit = checked_change("max_change_per_sample", arm, max_change_per_sample)
     checked_bounds(arm, minimum, maximum)  # check now, not at the first feasible posture
 
-    near = guess
-    found = dict[int, Stiffness]()
+    start = guess
+    planned = dict[int, Stiffness]()
     infeasible: list[InfeasibleSample] = []
     for i in show_progress(range(len(path)), "planning the path"):
         try:
             q = path[i]
             if tips is not None:
-                q = near = _angles(arm, q, near)
+                q = _angles(arm, q, start)
+                start = q
             space = TensionSpace(arm.at(q), directions, minimum, maximum, loads[i])
             goal = Goal(space, targets[i].reshape(-1))
-            last = max(found, default=i)
-            before = found[last].tension if found else None
-            F = _plan(goal, before, (i - last) * limit if found else limit, i - last)
-            found[i] = stiffness(space.pose, F, loads[i])
-        except _Infeasible as fault:
-            infeasible.append(InfeasibleSample(i, *fault.args))
+            last = max(planned, default=i)
+            before = planned[last].tension if planned else None
+            F = _plan(goal, before, (i - last) * limit if planned else limit, i - last)
+            planned[i] = stiffness(space.pose, F, loads[i])
+        except _Infeasible as cause:
+            infeasible.append(InfeasibleSample(i, cause.status, cause.reason))
         except CdsmError as error:
             if error.status.is_fault:  # of an argument: the other samples would have it, too
                 raise
             reason = str(error).replace(UNCHECKED, "")
             infeasible.append(InfeasibleSample(i, error.status, reason, error))
-    values = np.array([achieved(K, directions) for K in found.values()])
+    values = np.array([achieved(K, directions) for K in planned.values()])
     return PathPlan(
         arm=arm,
         direction=directions,
         target=targets,
         max_change_per_sample=limit,
-        planned=tuple(found),
-        angles=frozen(np.array([K.posture.q for K in found.values()]).reshape(-1, arm.nv)),
-        tensions=frozen(np.array([K.tension for K in found.values()]).reshape(-1, limit.size)),
+        planned=tuple(planned),
+        angles=frozen(np.array([K.posture.q for K in planned.values()]).reshape(-1, arm.nv)),
+        tensions=frozen(np.array([K.tension for K in planned.values()]).reshape(-1, limit.size)),
         achieved=frozen(values.reshape(-1, *directions.shape[:-1])),
-        stiffness=tuple(found.values()),
+        stiffness=tuple(planned.values()),
         infeasible=tuple(infeasible),
     )
 
 
 class _Infeasible(Exception):
-    """What prevents the plan of a sample and is no error of the library: status and reason."""
+    """What prevents the plan of a sample and is no error of the library."""
+
+    def __init__(self, status: Status, reason: str) -> None:
+        super().__init__(reason)
+        self.status = status
+        self.reason = reason
 
 
-def _angles(arm: Manipulator, tip: Array, near: ArrayLike | None) -> Array:
-    solved = inverse_kinematics(arm, tip, near)
-    if solved.reachable:
-        return solved.angles
-    near = f"{coordinates(1e3 * tip)} mm than {1e3 * solved.position_error:.3g} mm"
+def _angles(arm: Manipulator, tip: Array, guess: ArrayLike | None) -> Array:
+    solution = inverse_kinematics(arm, tip, guess)
+    if solution.reachable:
+        return solution.angles
+    distance = f"{coordinates(1e3 * tip)} mm than {1e3 * solution.position_error:.3g} mm"
     remedy = "Ask for a place within reach, or, in Python, start from a guess= nearer to it."
-    raise _Infeasible(Status.OUT_OF_REACH, f"the tip comes no nearer to {near}. {remedy}")
+    raise _Infeasible(Status.OUT_OF_REACH, f"the tip comes no nearer to {distance}. {remedy}")
 
 
 def _plan(goal: Goal, before: Array | None, change: Array, steps: int) -> Array:
     """Plan the least F (C,) [N] for a goal, at most ``change`` from ``before``, ``steps`` ago."""
-    near = None if before is None else goal.space.within(before, change)
-    if before is not None and (found := goal.search(before, near)) is not None:
-        return found
-    found = goal.least()
-    if not goal.met(found):
-        said = "no tensions were found that hit all targets at once. Ask for fewer, or for others; "
-        raise _Infeasible("stiffness", f"{said}plan_stiffness finds what comes nearest to them.")
+    # 1. the tensions of the sample before are usually near
+    allowed = None if before is None else goal.space.within(before, change)
+    if before is not None:
+        F = goal.search(before, allowed)
+        if F is not None:
+            return F
+    # 2. from scratch, without the limit of the change
+    least = goal.least()
+    if not goal.met(least):
+        raise _Infeasible(
+            Status.UNREACHABLE_STIFFNESS,
+            "no tensions were found that hit all targets at once. Ask for fewer, or for others; "
+            "plan_stiffness finds what comes nearest to them.",
+        )
     if before is None or np.isinf(change).all():
-        return found
-    nearest = goal.search(found, centre=before)
-    nearest = found if nearest is None else nearest
-    if (found := goal.search(nearest, near)) is not None:
-        return found
+        return least
+    # 3. with the limit, from the tensions with the least change
+    nearest = goal.search(least, centre=before)
+    nearest = least if nearest is None else nearest
+    F = goal.search(nearest, allowed)
+    if F is not None:
+        return F
     moved = abs(nearest - before)
     worst = int((moved / change).argmax())
     raise _Infeasible(
@@ -165,14 +180,15 @@ def checked_path(arm: Manipulator, angles: ArrayLike | None, tips: ArrayLike | N
     """Check and return the path: joint angles (S, nv) [rad] or tip positions (S, 3) [m]."""
     if (angles is None) == (tips is None):
         count = "neither" if angles is None else "both"
-        said = f"{count} of angles= and tips= given; give the path as one of them."
-        raise InvalidInput("angles", said)
-    name, given, width = ("tips", tips, 3) if angles is None else ("angles", angles, arm.nv)
-    path = number_array(name, given)  # type: ignore[arg-type]
+        problem = f"{count} of angles= and tips= given; give the path as one of them."
+        raise InvalidInput("angles", problem)
+    name = "tips" if angles is None else "angles"
+    width = 3 if angles is None else arm.nv
+    path = number_array(name, tips if angles is None else angles)  # type: ignore[arg-type]
     if path.ndim != 2 or path.shape[1] != width or not len(path):
         meaning = "a tip position [m]" if angles is None else "the joint angles [rad]"
-        said = f"shape {path.shape} given; (S, {width}) is needed, {meaning} for each sample."
-        raise InvalidInput(name, said)
+        problem = f"shape {path.shape} given; (S, {width}) is needed, {meaning} for each sample."
+        raise InvalidInput(name, problem)
     return frozen(path)
 
 

@@ -185,16 +185,16 @@ def checked_targets(target: ArrayLike, tail: tuple[int, ...], size: int | None =
     """Check and return targets [N/m] of shape ``tail`` or, with ``size``, (size, *tail)."""
     targets = per_sample("target", target, tail, size)
     if not (targets >= SMALLEST).all():
-        said = f"{targets.min():g} N/m given; stiffness is positive, at least {SMALLEST:g} N/m."
-        raise InvalidInput("target", said)
+        problem = f"{targets.min():g} N/m given; stiffness is positive, at least {SMALLEST:g} N/m."
+        raise InvalidInput("target", problem)
     return targets
 
 
 def per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int | None) -> Array:
     """Return an array of shape ``tail`` or, with ``size``, (size, *tail): one for each sample."""
-    given = number_array(name, value)
+    values = number_array(name, value)
     shape = tail if size is None else (size, *tail)
-    if given.shape not in (tail, shape):
-        said = f"{tail}" if size is None else f"{tail} for all samples or {shape}, one for each,"
-        raise InvalidInput(name, f"shape {given.shape} given; {said} is needed.")
-    return frozen(np.broadcast_to(given, shape).copy())
+    if values.shape not in (tail, shape):
+        needed = f"{tail}" if size is None else f"{tail} for all samples or {shape}, one for each,"
+        raise InvalidInput(name, f"shape {values.shape} given; {needed} is needed.")
+    return frozen(np.broadcast_to(values, shape).copy())

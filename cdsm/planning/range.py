@@ -90,9 +90,9 @@ class StiffnessRange(Result, Plotted):
     def __str__(self) -> str:
         (low, high) = self.ends / 1e3
         limited = self.limited_by_stability
-        said = f"along {coordinates(self.direction)} the stiffness can be {low:.4g} to {high:.4g}"
+        along = f"along {coordinates(self.direction)} the stiffness can be {low:.4g} to {high:.4g}"
         arm = self.posture.arm
-        lines = [f"{said} N/mm ({frictionless_model(arm)})"]
+        lines = [f"{along} N/mm ({frictionless_model(arm)})"]
         unit = arm.stiffness_unit()
         tensions = {"softest": self.low_tension, "stiffest": self.high_tension}
         for (name, F), stops in zip(tensions.items(), limited, strict=True):
@@ -186,12 +186,12 @@ def ends(space: TensionSpace, starts: int = STARTS) -> tuple[End, End]:
             return sign * value(F)
 
         starts = sorted({f"{value(F):.6g}": F for F in points}.values(), key=rank)[:most]
-        found: list[Array] = []
+        optima: list[Array] = []
         for F in starts:
-            found = sorted([*found, farther(space, sign, F)], key=rank)
-            if sum(rank(F) < rank(found[0]) + _SAME * value(found[0]) for F in found) == enough:
+            optima = sorted([*optima, farther(space, sign, F)], key=rank)
+            best = optima[0]
+            if sum(rank(F) < rank(best) + _SAME * value(best) for F in optima) == enough:
                 break
-        best = found[0]
         while rank(again := farther(space, sign, best)) < rank(best) - _GAIN * value(best):
             best = again
         return best
@@ -206,8 +206,8 @@ def ends(space: TensionSpace, starts: int = STARTS) -> tuple[End, End]:
         known = value(softest)
         other = np.where(2.0 * softest < low + high, high, low)
         beside = np.where(np.eye(len(other)) > 0.0, other, softest)  # one tension far away in each
-        found = (space.nearest(F, space.capped) for F in beside)
-        points = [space.pulled_back(F, 1e-3) for F in found if F is not None]
+        balanced = (space.nearest(F, space.capped) for F in beside)
+        points = [space.pulled_back(F, 1e-3) for F in balanced if F is not None]
         down = [downhill(space, F) for F in points]
         softest = best(1.0, [softest, *points, *down], _DESCENTS)
     unlimited = np.isinf(space.bounds[1])
@@ -238,10 +238,10 @@ def farther(space: TensionSpace, sign: float, F: Array) -> Array:
         tangent = max(s, _TANGENT * unit)  # the logarithm goes on straight below
         return -_STEEP * (np.log(tangent / unit) + s / tangent), -_STEEP * slope / tangent
 
-    found = space.search(F, goal, bounds=space.capped, **_SETTINGS)
-    if found is None:
+    optimum = space.search(F, goal, bounds=space.capped, **_SETTINGS)
+    if optimum is None:
         return F
-    return min(F, space.pulled_back(found), key=lambda F: sign * float(_along(space, F)[0]))
+    return min(F, space.pulled_back(optimum), key=lambda F: sign * float(_along(space, F)[0]))
 
 
 def downhill(space: TensionSpace, F: Array) -> Array:

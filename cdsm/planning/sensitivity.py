@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import CdsmError, InvalidInput
-from cdsm.planning.tension_space import FAR, form_by_tension, unstable
+from cdsm.planning.tension_space import LARGEST_TENSION, form_by_tension, unstable
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
@@ -99,7 +99,7 @@ class StiffnessGradient(Result):
     def __str__(self) -> str:
         arm = self.stiffness.posture.arm
         smallest = f"smallest joint stiffness [{arm.stiffness_unit()}]"
-        columns = (without_rounding(each) for each in (self.cable_stiffness / 1e3, self.margin))
+        columns = (without_rounding(slopes) for slopes in (self.cable_stiffness / 1e3, self.margin))
         rows = [["cable", "cable stiffness [N/mm]", smallest]]
         for name, *values in zip(arm.cables.names, *columns, strict=True):
             rows.append([name, *(f"{value:z.4g}" for value in values)])
@@ -228,7 +228,7 @@ def saturation(
     laws = [cable.elasticity for cable in arm.cables if cable.control == "position"]
     low = max([start, *(law.low for law in laws)])
     at(low).require_mobile(u)
-    highest = [(FAR * max(float(at(low).tension.max()), 1.0), Status.OK)]
+    highest = [(LARGEST_TENSION * max(float(at(low).tension.max()), 1.0), Status.OK)]
     highest += [(law.high, Status.OUTSIDE_ELASTICITY) for law in laws]
     own_maximum = arm.laws.narrowed(ceiling, ceiling)[1]
     highest += [(float(tension), Status.AT_MAXIMUM) for tension in own_maximum]
@@ -248,9 +248,9 @@ def saturation(
             limit = error.status
             break
     if not stable:
-        found = [at(b) for b in tried if b < lower] or [at(low)]
+        stiffnesses = [at(b) for b in tried if b < lower] or [at(low)]
         least = f"least tensions with lower bounds from {low:.4g} to {lower:.4g} N"
-        raise unstable(max(found, key=lambda K: K.margin), least)
+        raise unstable(max(stiffnesses, key=lambda K: K.margin), least)
     bounds = np.array(stable)
     along = np.array([at(lower).along(u) for lower in stable])
     top = int(along.argmax())

@@ -41,21 +41,21 @@ from cdsm.terms import CABLE_TERMS, required_torque, total
 MARGIN: Final = 1e-2
 """An arm counts as stable down to this part of the smallest eigenvalue of K_θ at the anchor."""
 
-FAR: Final = 1e3
+LARGEST_TENSION: Final = 1e3
 """Largest tension of a search without an upper bound, over the largest of the least tensions."""
 
 _REGULAR = 1e-3  # an arm is clearly stable from this part of its smallest diagonal entry on
-_FLAT = 1e-10  # singular values of J_Lᵀ below this part of the largest count as zero
+_RANK_TOLERANCE = 1e-10  # singular values of J_Lᵀ below this part of the largest count as zero
 _DIGITS = 6  # decimal places of tensions, over the largest of the least, in which corners differ
 
 Function = Callable[[Array], tuple[Any, Array]]
 """Function of F (C,) that returns its value, () or (n,), and its gradient, (C,) or (n, C)."""
 
-Bounds = tuple[Array, Array]
+Limits = tuple[Array, Array]
 """Lower and upper bounds of the tensions, (C,) [N] each."""
 
 
-class Point(NamedTuple):
+class StiffnessPoint(NamedTuple):
     """What follows from K_θ under given tensions F."""
 
     along: tuple[Array, Array]  # s = 1/(uᵀ C_vv u) (n,) [N/m] along n directions u, ∂s/∂F (n, C)
@@ -89,7 +89,7 @@ class TensionSpace:
         high = self.least.maximum_held
         self.unit = float(self.least.values.max()) or 1.0
         self.bounds = low, high
-        self.capped = low, np.minimum(high, FAR * max(self.unit, float(low.max())))
+        self.capped = low, np.minimum(high, LARGEST_TENSION * max(self.unit, float(low.max())))
         K = stiffness(pose, self.least)
         J = pose.length_jacobian
         for u in self.directions:
@@ -100,12 +100,12 @@ class TensionSpace:
         torque = required_torque(pose, self.least.wrench)
         self._balance = nondimensional(J, torque, low, high, pose.arm.length)
         _, sizes, basis = np.linalg.svd(J.T)
-        rank = int((sizes > _FLAT * sizes.max(initial=0.0)).sum())
+        rank = int((sizes > _RANK_TOLERANCE * sizes.max(initial=0.0)).sum())
         self._rows = basis[:rank]
         self._free = basis[rank:]
-        self._last: tuple[Array, Point] | None = None
+        self._last: tuple[Array, StiffnessPoint] | None = None
 
-    def at(self, F: Array) -> Point:
+    def at(self, F: Array) -> StiffnessPoint:
         """Evaluate K_θ under F (C,) [N], which rounding may have moved over the bounds."""
         F = np.clip(F, *self.bounds)
         if self._last and np.array_equal(F, self._last[0]):  # SLSQP asks for value, then gradient
@@ -120,7 +120,7 @@ class TensionSpace:
         s = 1.0 / (rows * right.T).sum(axis=1)
         left, right = (np.column_stack([s * M, vectors[:, 0]]) for M in (left, right))
         *slopes, softest = form_by_tension(pose, slope, left, right).diagonal(0, 1, 2).T
-        self._last = F, Point((s, np.array(slopes)), (float(values[0]), softest))
+        self._last = F, StiffnessPoint((s, np.array(slopes)), (float(values[0]), softest))
         return self._last[1]
 
     def reserve(self, F: Array) -> float:
@@ -135,7 +135,7 @@ class TensionSpace:
         k = pose.arm.laws.stiffness(pose.cable_lengths, F)
         return self.constant_stiffness + np.tensordot(F, pose.length_hessian, 1) + (J.T * k) @ J, k
 
-    def nearest(self, F: Array, bounds: Bounds | None = None) -> Array | None:
+    def nearest(self, F: Array, bounds: Limits | None = None) -> Array | None:
         """Return the balanced tensions (C,) [N] nearest to F within the bounds, if any."""
         solution = nearest_balanced(self._balance, F, *(bounds or self.bounds))
         return solution.x if solution.ok else None
@@ -144,7 +144,7 @@ class TensionSpace:
         """Return F (C,) [N] as a :class:`Tension`."""
         return replace(self.least, values=frozen(F.copy()), least=False)
 
-    def within(self, F: Array, change: Array) -> Bounds:
+    def within(self, F: Array, change: Array) -> Limits:
         """Return the bounds of tensions that differ from F by ``change`` at most, (C,) [N] each."""
         return np.maximum(self.bounds[0], F - change), np.minimum(self.bounds[1], F + change)
 
@@ -153,7 +153,7 @@ class TensionSpace:
         start: Array,
         objective: Function,
         *rules: tuple[str, Function],
-        bounds: Bounds | None = None,
+        bounds: Limits | None = None,
         stable: bool = True,
         precision: float = 1e-12,
         iterations: int = 100,
@@ -169,32 +169,32 @@ class TensionSpace:
         if (limits[0] > limits[1]).any():
             return None
 
-        def scaled(kind: str, of: Function) -> dict[str, Any]:
+        def scaled(kind: str, function: Function) -> dict[str, Any]:
             return {
                 "type": kind,
-                "fun": lambda x: of(unit * x)[0],
-                "jac": lambda x: unit * of(unit * x)[1],
+                "fun": lambda x: function(unit * x)[0],
+                "jac": lambda x: unit * function(unit * x)[1],
             }
 
         def balance(F: Array) -> tuple[Array, Array]:
             return self._rows @ (F - self.least.values) / unit, self._rows / unit
 
-        every = [*rules, *[("eq", balance)] * (len(self._rows) > 0)]
+        constraints = [*rules, *[("eq", balance)] * (len(self._rows) > 0)]
         if stable:
-            rule = affine(lambda F: self.at(F).smallest, MARGIN / self.floor, -MARGIN)
-            every.append(("ineq", rule))
+            stability = affine(lambda F: self.at(F).smallest, MARGIN / self.floor, -MARGIN)
+            constraints.append(("ineq", stability))
         goal = scaled("", objective)
         with without_warnings():  # of iterates beyond the bounds
-            found = minimize(
+            result = minimize(
                 goal["fun"],
                 np.clip(start, *limits) / unit,
                 jac=goal["jac"],
                 method="SLSQP",
                 bounds=np.transpose(limits) / unit,
-                constraints=[scaled(*each) for each in every],
+                constraints=[scaled(*rule) for rule in constraints],
                 options={"ftol": precision, "maxiter": iterations},
             )
-        return self.nearest(np.clip(unit * found.x, *limits), limits)
+        return self.nearest(np.clip(unit * result.x, *limits), limits)
 
     @cached_property
     def anchor(self) -> Array:
@@ -211,8 +211,8 @@ class TensionSpace:
             goal = affine(lambda F: self.at(F).smallest, -1.0 / self._size)
             points = [best, *self._corners(0)]
             starts = max(points, key=smallest), np.mean(points, axis=0)
-            found = [self.search(F, goal, bounds=self.capped, stable=False) for F in starts]
-            best = max([*points, *(F for F in found if F is not None)], key=smallest)
+            optima = [self.search(F, goal, bounds=self.capped, stable=False) for F in starts]
+            best = max([*points, *(F for F in optima if F is not None)], key=smallest)
         if smallest(best) <= 0.0:
             K = stiffness(self.pose, best, self.least.wrench)
             raise unstable(K, "admissible tensions", self.bounds)
@@ -226,7 +226,12 @@ class TensionSpace:
     def corner(self, way: Array) -> Array | None:
         """Return the balanced tensions (C,) [N] farthest in the direction ``way`` (C,), if any."""
         step = (self._free @ way) @ self._free
-        far = FAR * self.capped[1].max() / max(float(np.linalg.norm(step)), SMALLEST) * step
+        far = (
+            LARGEST_TENSION
+            * self.capped[1].max()
+            / max(float(np.linalg.norm(step)), SMALLEST)
+            * step
+        )
         return self.nearest(self.least.values + far, self.capped)
 
     def corners(self, random: int) -> list[Array]:
@@ -237,10 +242,10 @@ class TensionSpace:
         axes = np.eye(self.least.values.size)
         others = np.random.default_rng(0).normal(size=(random, len(axes)))
         ways = (*axes, *-axes, *others)
-        known = [F for F in map(self.corner, ways) if F is not None]
-        found = np.array(known or [self.least.values])
-        _, different = np.unique(np.round(found / self.unit, _DIGITS), axis=0, return_index=True)
-        return found[np.sort(different)]
+        balanced = [F for F in map(self.corner, ways) if F is not None]
+        corners = np.array(balanced or [self.least.values])
+        _, different = np.unique(np.round(corners / self.unit, _DIGITS), axis=0, return_index=True)
+        return corners[np.sort(different)]
 
     def pulled_back(self, F: Array, precision: float = 1e-14) -> Array:
         """Return the stable tensions nearest to F (C,) [N] on the line from F to the anchor."""
@@ -256,14 +261,14 @@ class TensionSpace:
         return moved(part)
 
 
-def affine(of: Function, factor: float, constant: float = 0.0) -> Function:
-    """Return the function ``factor`` · ``of`` + ``constant``."""
+def affine(function: Function, factor: float, constant: float = 0.0) -> Function:
+    """Return the function ``factor`` · ``function`` + ``constant``."""
 
-    def value(F: Array) -> tuple[Any, Array]:
-        found, gradient = of(F)
-        return factor * found + constant, factor * gradient
+    def scaled(F: Array) -> tuple[Any, Array]:
+        value, gradient = function(F)
+        return factor * value + constant, factor * gradient
 
-    return value
+    return scaled
 
 
 def form_by_tension(pose: Posture, slope: Array, left: Array, right: Array) -> Array:
@@ -279,17 +284,19 @@ def form_by_tension(pose: Posture, slope: Array, left: Array, right: Array) -> A
     return np.asarray(active + passive)
 
 
-def unstable(K: Stiffness, tried: str, bounds: Bounds | None = None) -> SingularStiffness:
+def unstable(K: Stiffness, tried: str, bounds: Limits | None = None) -> SingularStiffness:
     """Return the error that none of the tensions ``tried`` make the arm stable; K is the best."""
     arm = K.posture.arm
-    said = f"no {tried} make the arm stable. At best: {verdict(K)}. {too_few_cables(arm)}"
+    problem = f"no {tried} make the arm stable. At best: {verdict(K)}. {too_few_cables(arm)}"
     if all(cable.control == "force" for cable in arm.cables):
-        said += "All motors control force, so that no cable resists by its elasticity: have some "
-        said += 'hold their length (control="position").'
+        problem += (
+            "All motors control force, so that no cable resists by its elasticity: have some "
+        )
+        problem += 'hold their length (control="position").'
     else:
         wider = advice(arm, K.tension, *bounds) if bounds else ""
-        said += f"Change the posture or the load, take stiffer cables{wider and f', {wider}'}."
-    return SingularStiffness(said, K.critical_direction)
+        problem += f"Change the posture or the load, take stiffer cables{wider and f', {wider}'}."
+    return SingularStiffness(problem, K.critical_direction)
 
 
 def _least_tension_within_laws(

@@ -206,3 +206,11 @@ def test_bad_input_is_named(change: dict[str, Any], message: str) -> None:
     given = {"arm": ARM, "direction": DOWN, "target": 8e4, "minimum": 50.0, "angles": waving(2)}
     with pytest.raises(cdsm.InvalidInput, match=message):
         cdsm.plan_path(**{**given, **change})
+
+
+def test_a_sample_whose_targets_are_not_hit_together_is_named_as_such() -> None:
+    targets = [[80e3, 1.0], [80e3, 1.0]]
+    plan = cdsm.plan_path(ARM, [DOWN, (0.0, 1.0, 0.0)], targets, 50.0, 400.0, angles=waving(2))
+    assert [sample.status for sample in plan.infeasible] == [Status.UNREACHABLE_STIFFNESS] * 2
+    assert "at once" in plan.infeasible[0].reason
+    assert "UNREACHABLE STIFFNESS" in str(plan)
