@@ -167,9 +167,9 @@ def _edges(K: Stiffness, c: int) -> list[str]:
     high = cable.elasticity.high
     if F == 0.0:
         return [f"{cable.name} is slack (0 N), and K_θ counts it as if it were taut"]
-    said = f"{cable.name} at {F:.4g} N is within {_EDGE:.0%} of an end of its law"
+    problem = f"{cable.name} at {F:.4g} N is within {_EDGE:.0%} of an end of its law"
     near = min(abs(F - low), abs(F - high)) <= _EDGE * F
-    return [f"{said}, {low:g} to {high:g} N"] if near else []
+    return [f"{problem}, {low:g} to {high:g} N"] if near else []
 
 
 def _step(K: Stiffness) -> float:

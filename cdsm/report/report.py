@@ -27,11 +27,12 @@ def report_on(K: Stiffness) -> Report:
 def _faults(report: Report) -> Iterator[str]:
     """Yield the reasons not to use the stiffness of ``report``."""
     K = report.stiffness
-    for each in report.comparisons:
-        if each.verdict == "DIFFERS":
+    for comparison in report.comparisons:
+        if comparison.verdict == "DIFFERS":
             yield (
-                f"{each.name}: off by {each.off:.2g} {each.unit}, where the largest entry is "
-                f"{each.largest:.4g} {each.unit}. Do not use this stiffness."
+                f"{comparison.name}: off by {comparison.off:.2g} {comparison.unit}, where the "
+                f"largest entry is {comparison.largest:.4g} {comparison.unit}. Do not use this "
+                "stiffness."
             )
     checks_of_k = [check for check in report.comparisons if check.name != "batch"]
     for reason in dict.fromkeys(check.reason for check in checks_of_k if check.reason):
@@ -115,11 +116,13 @@ def _of_limits(K: Stiffness) -> Iterator[str]:
 def _stuck(K: Stiffness) -> str:
     """Return below which load friction holds all cables, and the stiffness there."""
     try:
-        found = [(axis, breakaway(K.posture, K.tension, axis, K.wrench)) for axis in "xyz"]
-        stuck = ", ".join(f"{each.stiffness.along(u) / 1e3:.4g}" for u, each in found)
+        thresholds = [(axis, breakaway(K.posture, K.tension, axis, K.wrench)) for axis in "xyz"]
+        stuck = ", ".join(
+            f"{threshold.stiffness.along(u) / 1e3:.4g}" for u, threshold in thresholds
+        )
     except CdsmError as error:  # the stuck arm is singular, or a tension outside its law
         return f"The load below which they stick is not known: {error}"
-    if not any(each.load for _, each in found):
+    if not any(threshold.load for _, threshold in thresholds):
         return "Here no cable sticks."
-    loads = ", ".join(f"{each.load:.2g}" for _, each in found)
+    loads = ", ".join(f"{threshold.load:.2g}" for _, threshold in thresholds)
     return f"Below {loads} N along x, y, z they stick, and a load measures {stuck} N/mm."

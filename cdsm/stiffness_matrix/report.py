@@ -129,8 +129,10 @@ def _printed(report: Report, about: str = "") -> Console:
             table.add_row(*row)
         console.print(table)
         console.print()
-    said = "K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle. F is tension, the cables' "
-    console.print(f"{said}torque −J_Lᵀ F, the wrench W a dead load; readings are in base axes.")
+    console.print(
+        "K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle. F is tension, the cables' "
+        "torque −J_Lᵀ F, the wrench W a dead load; readings are in base axes."
+    )
     if (arm := report.stiffness.posture.arm).slides.any():
         console.print(f"Sliding joints count with the arm's length, {arm.length:.4g} m, as lever.")
     return console
@@ -139,11 +141,13 @@ def _printed(report: Report, about: str = "") -> Console:
 def _tables(report: Report) -> Iterator[tuple[tuple[str, ...], ...]]:
     """Yield the rows of each table; the first has the titles of its columns."""
     rows = []
-    for each in report.comparisons:
-        size = each.largest or 1.0
-        off = ("-", "-") if each.reason else (f"{each.off / size:.0e}", f"{each.error / size:.0e}")
-        name = "cdsm.evaluate, all terms" if each.name == "batch" else each.name
-        rows.append((name, f"{each.largest:.4g} {each.unit}", *off, each.verdict))
+    for comparison in report.comparisons:
+        size = comparison.largest or 1.0
+        off = ("-", "-")
+        if not comparison.reason:
+            off = (f"{comparison.off / size:.0e}", f"{comparison.error / size:.0e}")
+        name = "cdsm.evaluate, all terms" if comparison.name == "batch" else comparison.name
+        rows.append((name, f"{comparison.largest:.4g} {comparison.unit}", *off, comparison.verdict))
     yield ("against finite differences", "largest entry", "off by", "error bound", "verdict"), *rows
     violation, kkt = (
         "-" if x is None else f"{x:.1e}" for x in (report.bound_violation, report.kkt_residual)

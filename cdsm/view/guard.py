@@ -43,8 +43,8 @@ def guarded_server(port: int, label: str) -> viser.ViserServer:
     try:
         socket.create_server((_HOST, port)).close()
     except OSError as error:
-        said = f"{port} is not available ({error.strerror}); give another port, or 0."
-        raise InvalidInput("port", said) from None
+        remedy = f"{port} is not available ({error.strerror}); give another port, or 0."
+        raise InvalidInput("port", remedy) from None
     original = websocket_server.serve
     called = threading.Event()
 
@@ -109,12 +109,14 @@ def _answer(reply: Any, connection: ServerConnection, request: Request) -> Respo
     """Refuse a request for a page or a websocket, or let viser's ``reply`` answer it."""
     hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
     here = len(hosts) == 1 and _is_loopback(re.sub(r":\d+$", "", hosts[0]).strip("[]"))
-    if not here or any(each != f"http://{hosts[0]}" for each in origins):
+    if not here or any(origin != f"http://{hosts[0]}" for origin in origins):
         return connection.respond(HTTPStatus.FORBIDDEN, "Not allowed to see this view.\n")
     response: Response | None = reply(connection, request)
     if response is not None:  # a page, no websocket
-        own = f"'self' ws://{hosts[0]} data: blob:"
-        response.headers["Content-Security-Policy"] = f"connect-src {own}; frame-ancestors 'self'"
+        sources = f"'self' ws://{hosts[0]} data: blob:"
+        response.headers["Content-Security-Policy"] = (
+            f"connect-src {sources}; frame-ancestors 'self'"
+        )
     return response
 
 

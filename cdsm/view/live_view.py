@@ -264,13 +264,13 @@ class TipHandle:
         self._target = None
         if target is None or panel.pulls:
             return
-        found = inverse_kinematics(self._arm, target, panel.setting.q)
-        panel.move(found.angles)
+        solution = inverse_kinematics(self._arm, target, panel.setting.q)
+        panel.move(solution.angles)
         self._q = panel.setting.q
         self._remark = ""
-        if not found.reachable:
-            stops = f" ({', '.join(found.at_limit)} at a limit)" if found.at_limit else ""
-            missed = f"{MM * found.position_error:.3g} mm"
+        if not solution.reachable:
+            stops = f" ({', '.join(solution.at_limit)} at a limit)" if solution.at_limit else ""
+            missed = f"{MM * solution.position_error:.3g} mm"
             self._remark = f"The tip stays {missed} away from the handle{stops}."
 
     def update(self, shown: Shown) -> str:

@@ -181,7 +181,7 @@ def results_text(shown: Shown, scene: Scene, remark: str = "") -> str:
     style = f"background:{_COLORS.get(shown.status, _GREY)};color:white;text-align:center"
     parts = [f'<div style="{style}"><b>{shown.heading}</b></div>']
     parts += [] if shown.status is Status.OK else [f"{shown.status.message}."]
-    parts += [escaped(each) for each in (remark, shown.problem) if each]
+    parts += [escaped(line) for line in (remark, shown.problem) if line]
     parts.append(_table(_numbers(shown)))
     if shown.stiffness is not None:
         parts.append(escaped(model_of(shown.stiffness)))
@@ -225,9 +225,9 @@ def python_text(arm: Manipulator, setting: Setting) -> str:
             f"pull = [{_joined(setting.pull)}]\n"
             f"rest = cdsm.forward_statics(arm, pull=pull, wrench={wrench})\n```"
         )
-    given = [f"{setting.minimum:.12g}"]
-    given += [f"{setting.maximum:.12g}"] if math.isfinite(setting.maximum) else []
-    given += [f"wrench={wrench}"] if setting.force.any() and not setting.sag else []
+    arguments = [f"{setting.minimum:.12g}"]
+    arguments += [f"{setting.maximum:.12g}"] if math.isfinite(setting.maximum) else []
+    arguments += [f"wrench={wrench}"] if setting.force.any() and not setting.sag else []
     last = "K = cdsm.stiffness(pose, tension)"
     if setting.sag and arm.has_friction:
         last = f"K = cdsm.load_cycle(pose, tension, [{wrench}]).stiffness(-1)"
@@ -235,13 +235,13 @@ def python_text(arm: Manipulator, setting: Setting) -> str:
         last = f"rest = cdsm.equilibrium(pose, tension, {wrench})"
     return (
         f"The same in Python:\n```\npose = arm.at([{_joined(setting.q)}])\n"
-        f"tension = cdsm.distribute_tension(pose, {', '.join(given)})\n{last}\n```"
+        f"tension = cdsm.distribute_tension(pose, {', '.join(arguments)})\n{last}\n```"
     )
 
 
 def escaped(text: str) -> str:
     """Return text in which no character means anything to Markdown or HTML."""
-    marked = re.sub(r"[^\w\s.,]|_", lambda found: f"&#{ord(found[0])};", text)
+    marked = re.sub(r"[^\w\s.,]|_", lambda match: f"&#{ord(match[0])};", text)
     return marked.replace("\n", "<br>")
 
 

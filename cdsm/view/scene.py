@@ -138,8 +138,8 @@ class Scene:
         for i, (cable, path) in enumerate(zip(self._cables, pose.cable_paths, strict=True)):
             cable.points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
             cable.colors = np.array(shown.cable_colors[i], dtype=np.uint8)
-            said = "" if shown.tensions is None else f": {shown.tensions[i]:.4g} N"
-            self._names[i].text = self._arm.cables[i].name + said
+            tension = "" if shown.tensions is None else f": {shown.tensions[i]:.4g} N"
+            self._names[i].text = self._arm.cables[i].name + tension
             self._names[i].position = path[-1]
         if ellipsoid is not None:
             self._ellipsoid.vertices = ellipsoid.surface.reshape(3, -1).T.astype(np.float32)

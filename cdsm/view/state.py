@@ -121,36 +121,36 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
         pose = arm.at(setting.q)
     except CdsmError as error:
         return Shown(setting=setting, status=error.status, problem=str(error))
-    found: dict[str, Any] = {"setting": setting, "reference": pose}
+    results: dict[str, Any] = {"setting": setting, "reference": pose}
     try:
         force = np.concatenate([setting.force, np.zeros(3)])
         if setting.pull is not None:
             rest = cdsm.forward_statics(arm, pull=setting.pull, wrench=force)
-            found |= {"rest": rest, "stiffness": rest.stiffness}
+            results |= {"rest": rest, "stiffness": rest.stiffness}
             status = Status.OK if rest.branch == 1.0 else Status.MOVED
             status = Status.NEUTRAL if rest.neutral or not rest.stable else status
-            said = "\n".join([*rest.warnings, *rest.pose.remarks])
-            return Shown(**found, status=status, problem=said)
+            warnings = "\n".join([*rest.warnings, *rest.pose.remarks])
+            return Shown(**results, status=status, problem=warnings)
         wrench = force * (not setting.sag)
         tension = distribute_tension(pose, setting.minimum, setting.maximum, wrench)
-        found["tension"] = tension
+        results["tension"] = tension
         if not setting.sag:
-            found["stiffness"] = K = stiffness(pose, tension)
+            results["stiffness"] = K = stiffness(pose, tension)
             _ = K.compliance  # raises if K_θ is singular
             if not K.is_stable:
-                said = "\n".join(K.warnings)  # takes tenths of a second: what would stabilise
-                return Shown(**found, status=Status.UNSTABLE, problem=said)
-            return Shown(**found, status=Status.OK, problem="\n".join(pose.remarks))
+                warnings = "\n".join(K.warnings)  # takes tenths of a second: what would stabilise
+                return Shown(**results, status=Status.UNSTABLE, problem=warnings)
+            return Shown(**results, status=Status.OK, problem="\n".join(pose.remarks))
         locked = cdsm.stuck_stiffness if arm.has_friction else stiffness
         stable = locked(pose, tension).is_stable
-        rest, found["sliding"] = _rest(pose, tension, force)
-        found |= {"rest": rest, "stiffness": rest.stiffness}
+        rest, results["sliding"] = _rest(pose, tension, force)
+        results |= {"rest": rest, "stiffness": rest.stiffness}
         _ = rest.compliance
         status = Status.OK if stable else Status.MOVED
         status = status if rest.stable else Status.NEUTRAL
-        return Shown(**found, status=status, problem="\n".join(rest.pose.remarks))
+        return Shown(**results, status=status, problem="\n".join(rest.pose.remarks))
     except CdsmError as error:
-        return Shown(**found, status=error.status, problem=str(error))
+        return Shown(**results, status=error.status, problem=str(error))
 
 
 def _rest(
