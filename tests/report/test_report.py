@@ -195,11 +195,11 @@ def test_distributed_tensions_are_optimal() -> None:
 def test_tensions_that_are_not_the_least_or_break_a_bound_are_found() -> None:
     pose = locked.hinge().at([0.0])
     pull = cdsm.distribute_tension(pose, 10.0)
-    lax = cdsm.stiffness(pose, replace(pull, minimum=frozen(np.full(2, 5.0)))).report()
+    lax = cdsm.stiffness(pose, replace(pull, minimum_held=frozen(np.full(2, 5.0)))).report()
     # F = (10, 10) could fall along (1, 1): all of it is left
     assert lax.kkt_residual == pytest.approx(1.0, rel=1e-12)
     assert any("not optimal" in fault for fault in lax.faults)
-    low = cdsm.stiffness(pose, replace(pull, minimum=frozen(np.full(2, 11.0)))).report()
+    low = cdsm.stiffness(pose, replace(pull, minimum_held=frozen(np.full(2, 11.0)))).report()
     assert low.bound_violation == pytest.approx(0.1, rel=1e-12)
     planned = cdsm.stiffness(pose, replace(pull, values=pull.values + 1.0, least=False)).report()
     assert planned.passed, planned.faults
