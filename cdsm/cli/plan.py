@@ -104,6 +104,9 @@ def _one_target(given: float | None, of_file: Array | None) -> float | Array:
 
 _GRID = "Grid of joint angles [deg, or mm where they slide]: first, last and number, or one angle; "
 _GRID += "other joints stay at 0."
+_ALONG = "Direction of along and payload, such as -y; default: x, y and z."
+_WORST = "Keep all segments within the bounds, whatever loads came before."
+_DIAMETER = "Of all cables, for clearances; default: that of a wire of the catalogue."
 _OUTPUTS = f"Quantities of the table: {', '.join(names_of('sweep'))}."
 
 
@@ -117,6 +120,9 @@ def sweep_postures(
     minimum: Annotated[str, opt("Lower bounds of all tensions [N], a case each.", "N,...")] = "0",
     maximum: options.MaximumOption = math.inf,
     load: options.LoadOption = None,
+    direction: Annotated[str | None, opt(_ALONG, "AXIS|X,Y,Z")] = None,
+    worst_friction: Annotated[bool, opt(_WORST, None, "--worst-friction")] = False,
+    diameter: Annotated[float | None, opt(_DIAMETER, "MM", min=0.0)] = None,
     outputs: Annotated[str | None, opt(_OUTPUTS, "NAME,...")] = None,
     store: Annotated[
         Path | None, opt("Keeps what is done; a stopped sweep resumes.", "FOLDER")
@@ -136,6 +142,7 @@ def sweep_postures(
     if figure is None and quantity != "softest":
         raise misuse("--quantity", "is of --figure; give both.")
     from cdsm.support.status import status_names
+    from cdsm.support.validation import XYZ
     from cdsm.sweeps.cases import DEFAULT
     from cdsm.sweeps.files import write_sweep
     from cdsm.sweeps.store import read_into_memory
@@ -151,7 +158,10 @@ def sweep_postures(
         minimum=low[0] if len(low) == 1 else low,
         maximum=maximum,
         wrench=options.load_at_tip(robot, load),
+        direction=XYZ if direction is None else options.parse_direction(direction),
         outputs=names,
+        worst_friction=worst_friction,
+        diameter=_diameter(robot, diameter, names),
         store=store,
     )
     if store is not None and (out or figure):
@@ -173,6 +183,23 @@ def sweep_postures(
     lines += [f"written: {each}" for each in written]
     told: Json = {"entries": counts, "written": written}
     return answer(as_json, numbers | told, head, "\n".join(lines), warnings=warnings)
+
+
+def _diameter(arm: cdsm.Manipulator, diameter: float | None, outputs: list[str]) -> float:
+    """Return the diameter of the cables [m]: that of --diameter, or of their wire."""
+    from cdsm.measures.clearance import KINDS
+    from cdsm.wires.catalogue import diameter_of
+
+    if diameter is not None:
+        return 1e-3 * diameter
+    if not {*KINDS} & {*outputs}:
+        return 0.0
+    diameters = {diameter_of(cable.elasticity) for cable in arm.cables}
+    (known,) = diameters if len(diameters) == 1 else (None,)
+    if known is None:
+        problem = "clearances need it, since the wires of the cables have no common one that is"
+        raise misuse("--diameter", f"{problem} known; give the diameter of the cables [mm].")
+    return known
 
 
 def _postures(

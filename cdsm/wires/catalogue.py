@@ -112,6 +112,12 @@ def name_of(law: Elasticity) -> str | None:
     return next((name for name, known in WIRES.items() if known == law), None)
 
 
+def diameter_of(law: Elasticity) -> float | None:
+    """Return the diameter [m] of a wire of :data:`WIRES`, with which its name ends, or None."""
+    name = name_of(law)
+    return None if name is None else 1e-3 * float(name.rpartition("-")[2].removesuffix("mm"))
+
+
 def label(law: Elasticity) -> str:
     """Return a short text for a law: the name of its wire, its EA, or its kind and tensions."""
     if law.constant_rigidity or name_of(law):

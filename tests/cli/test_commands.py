@@ -232,6 +232,40 @@ def test_sweep(probe: Path, pose: cdsm.Posture, tmp_path: Path) -> None:
     assert ("margin" in head, "along" in head) == (True, False)
 
 
+@pytest.mark.parametrize(
+    ("options", "arguments"),
+    [
+        ((), {"diameter": 1.2e-3}),  # that of the strand, by its name
+        (("--diameter", 2), {"diameter": 2e-3}),
+        (("--direction", "-y"), {"diameter": 1.2e-3, "direction": "-y"}),
+        (
+            ("--set", "friction=0.1", "--worst-friction"),
+            {"diameter": 1.2e-3, "worst_friction": True},
+        ),
+    ],
+)
+def test_options_of_a_sweep_are_arguments_of_python(
+    options: tuple[object, ...], arguments: dict[str, Any], probe: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "s.nc"
+    words = ("sweep", probe, "--random", 4, "--minimum", 9, "--out", out)
+    told(*words, "--outputs", "cable_clearance,disk_clearance,along", *options)
+    changes = {"friction": 0.1} if "--set" in options else {}
+    arm = cdsm.Manipulator.read(probe, changes=changes)
+    outputs = ("cable_clearance", "disk_clearance", "along")
+    expected = cdsm.sweep(arm, cdsm.RandomPoses(4), minimum=9.0, outputs=outputs, **arguments)
+    assert expected["cable_clearance"].notnull().any()
+    xr.testing.assert_allclose(cdsm.read_sweep(out), expected)
+
+
+def test_clearances_of_cables_of_unknown_diameter_are_refused(probe: Path, tmp_path: Path) -> None:
+    words = ("sweep", probe, "--random", 4, "--minimum", 9, "--out", tmp_path / "s.nc")
+    run = call(*words, "--outputs", "disk_clearance", "--set", "wire=48e3")
+    assert run.exit_code == 2
+    assert "give the diameter of the cables" in " ".join(run.stderr.split())
+    told(*words, "--outputs", "disk_clearance", "--set", "wire=48e3", "--diameter", 0)
+
+
 def test_new_writes_the_arm_of_the_readme(tmp_path: Path) -> None:
     path = tmp_path / "ARM.toml"
     found = told("new", path)
