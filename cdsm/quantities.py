@@ -19,9 +19,9 @@ Needs = Literal["posture", "tension", "stiffness", "stable arm", "all postures",
 Output = Literal["batch", "sweep", "uncertainty", "design"]
 """What gives a quantity: a batch, a sweep, an uncertainty budget, a design."""
 
-JOINTS: Final = ("joint", "joint_column")
-AXES: Final = ("axis", "axis_column")
-MOTIONS: Final = ("motion", "motion_column")
+JOINT_DIMS: Final = ("joint", "joint_column")
+AXIS_DIMS: Final = ("axis", "axis_column")
+MOTION_DIMS: Final = ("motion", "motion_column")
 
 UNITS_OF_JOINTS: Final = {
     "joint": ("rad", "m"),
@@ -116,10 +116,10 @@ QUANTITIES: Final[dict[str, Quantity]] = {
         "posture", "gravity torque", "g = ∂V/∂θ", "torque", ("joint",),
         outputs=_ARRAYS),
     "gravity": Quantity(
-        "posture", "gravity term of the joint stiffness", "∂g/∂θ (Eq. 16)", _K, JOINTS,
+        "posture", "gravity term of the joint stiffness", "∂g/∂θ (Eq. 16)", _K, JOINT_DIMS,
         outputs=_ARRAYS),
     "springs": Quantity(
-        "posture", "spring term of the joint stiffness", "of the joint springs", _K, JOINTS,
+        "posture", "spring term of the joint stiffness", "of the joint springs", _K, JOINT_DIMS,
         outputs=_ARRAYS),
     "tension_factor": Quantity(
         "posture", "tension factor", "largest min F/max F with J_Lᵀ F = 0; 0: no wrench closure",
@@ -140,10 +140,10 @@ QUANTITIES: Final[dict[str, Quantity]] = {
         "tension", "residual of the balance", "J_Lᵀ F − (J_Xᵀ W − g) + k (q − q_0)", "torque",
         ("joint",), outputs=_BATCH),
     "active": Quantity(
-        "tension", "active term of the joint stiffness", "H_L·F (Eq. 16)", _K, JOINTS,
+        "tension", "active term of the joint stiffness", "H_L·F (Eq. 16)", _K, JOINT_DIMS,
         outputs=_ARRAYS),
     "load": Quantity(
-        "tension", "load term of the joint stiffness", "−∂(J_Xᵀ W)/∂θ (Eq. 16)", _K, JOINTS,
+        "tension", "load term of the joint stiffness", "−∂(J_Xᵀ W)/∂θ (Eq. 16)", _K, JOINT_DIMS,
         outputs=_ARRAYS),
     "payload": Quantity(
         "tension", "payload along a direction", _BOUNDED, "N", ("direction",),
@@ -155,31 +155,31 @@ QUANTITIES: Final[dict[str, Quantity]] = {
         "stiffness", "cable stiffness", "diagonal of K_L", "N/m", ("cable",),
         outputs=_ARRAYS),
     "passive": Quantity(
-        "stiffness", "passive term of the joint stiffness", "J_Lᵀ K_L J_L (Eq. 16)", _K, JOINTS,
+        "stiffness", "passive term of the joint stiffness", "J_Lᵀ K_L J_L (Eq. 16)", _K, JOINT_DIMS,
         outputs=_ARRAYS),
     "joint": Quantity(
-        "stiffness", "joint stiffness", "K_θ (Eq. 16)", _K, JOINTS,
+        "stiffness", "joint stiffness", "K_θ (Eq. 16)", _K, JOINT_DIMS,
         outputs=_BATCH),
     "joint_stiffness": Quantity(  # no variable of a Dataset may have the name of a dimension
-        "stiffness", "joint stiffness", "K_θ (Eq. 16)", _K, JOINTS,
+        "stiffness", "joint stiffness", "K_θ (Eq. 16)", _K, JOINT_DIMS,
         outputs=_SWEEP, reads=("joint",), compute=lambda joint: joint),
     "margin": Quantity(
         "stiffness", "smallest joint stiffness", "smallest eigenvalue of the symmetric part of K_θ",
         _K, best="most", outputs=_ALL),
     "pseudoinverse": Quantity(
-        "stiffness", "the paper's Cartesian stiffness", "J⁺ᵀ K_θ J⁺", "N/m", AXES,
+        "stiffness", "the paper's Cartesian stiffness", "J⁺ᵀ K_θ J⁺", "N/m", AXIS_DIMS,
         outputs=_ARRAYS),
     "along": Quantity(
         "stiffness", "stiffness along a direction", "1/(uᵀ C_vv u) (Eq. 20)", "N/m",
         ("direction",), best="most", outputs=_ALL),
     "compliance": Quantity(
-        "stiffness", "compliance", "C = J_X K_θ⁻¹ J_Xᵀ, tip motion per wrench", "1", MOTIONS,
+        "stiffness", "compliance", "C = J_X K_θ⁻¹ J_Xᵀ, tip motion per wrench", "1", MOTION_DIMS,
         outputs=_ARRAYS),
     "translational_compliance": Quantity(
-        "stiffness", "translational compliance", "C_vv, tip motion per force", "m/N", AXES,
+        "stiffness", "translational compliance", "C_vv, tip motion per force", "m/N", AXIS_DIMS,
         outputs=_SWEEP, reads=("compliance",), compute=lambda compliance: compliance[..., :3, :3]),
     "cartesian": Quantity(
-        "stiffness", "Cartesian stiffness", "inverse of C_vv", "N/m", AXES,
+        "stiffness", "Cartesian stiffness", "inverse of C_vv", "N/m", AXIS_DIMS,
         outputs=_ARRAYS),
     "deflection": Quantity(
         "stiffness", "first-order deflection under the load", "|C_vv f|, motors locked", "m",

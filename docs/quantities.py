@@ -26,7 +26,7 @@ def _line(name: str, quantity: Quantity) -> str:
     units = UNITS_OF_JOINTS.get(quantity.unit, (quantity.unit,))
     cells = [
         f"`{name}`",
-        quantity.text.replace("|", r"\\|"),
+        quantity.text.replace("|", r"\|"),
         " or ".join(units),
         ", ".join(quantity.dims),
         quantity.needs,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cdsm import readings
 from cdsm.manipulator import Manipulator
-from cdsm.quantities import AXES, QUANTITIES, names_of
+from cdsm.quantities import AXIS_DIMS, QUANTITIES, names_of
 from cdsm.status import ENTRY_STATUSES, Status
 from cdsm.support.result import Result
 from cdsm.support.status import summary
@@ -93,7 +93,7 @@ class OfPostures(Result):
             unit = QUANTITIES[name].unit
             if name == "tip":
                 yield "tip_position", value[:, :3, 3], "m", ("pose", "axis")
-                yield "tip_rotation", value[:, :3, :3], "1", ("pose", *AXES)
+                yield "tip_rotation", value[:, :3, :3], "1", ("pose", *AXIS_DIMS)
                 continue
             # one direction has no axis of its own; a variable must not have the name of a dimension
             shown = value[:, None] if name == "along" and value.ndim == 1 else value

@@ -179,13 +179,13 @@ class DesignProblem(ReadOnlyState):
             InvalidInput: A number of the design is outside its range.
             GeometryError: No valid arm has these values; the error lists every fault.
         """
-        made = self._made(design)
+        made = self.unbounded_arm_of(design)
         low = self.minimum_of(design)
         bounds = [(max(c.minimum, low), min(c.maximum, self.maximum)) for c in made.cables]
         pairs = zip(made.cables, bounds, strict=True)
         return made.with_cables([replace(c, minimum=a, maximum=b) for c, (a, b) in pairs])
 
-    def _made(self, design: ArrayLike) -> Manipulator:
+    def unbounded_arm_of(self, design: ArrayLike) -> Manipulator:
         """Build the arm of a design, without the problem's bounds."""
         return changed(self.arm, dict(zip(self.variables, self.values(design), strict=True)))
 

@@ -46,7 +46,7 @@ def quiet_arm(problem: DesignProblem, design: Array) -> Manipulator:
     """Build the arm of a design (n,) without warnings, such as that cables share a hole."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CdsmWarning)
-        return problem._made(design)
+        return problem.unbounded_arm_of(design)
 
 
 class _Pairs:

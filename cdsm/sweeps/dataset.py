@@ -66,7 +66,7 @@ class Labelled(Cases):
             output_core_dims=dims,
             dask="parallelized",
             output_dtypes=[np.int8 if name == "status" else np.float64 for name in names],
-            dask_gufunc_kwargs={"output_sizes": {d: self.sizes[d] for own in dims for d in own}},
+            dask_gufunc_kwargs={"output_sizes": {d: self.sizes[d] for core in dims for d in core}},
         )
         dataset = xarray.Dataset(dict(zip(names, variables, strict=True)), attrs=self._about())
         dataset.attrs["poses"] = q.attrs.get("poses", "as given")
@@ -100,7 +100,7 @@ class Labelled(Cases):
         force, moment = np.split(self.wrench, 2, axis=1)
         low, high = self.held_bounds
         coordinates: dict[str, Any] = {}
-        for name, of, values, long_name, units in (
+        for name, along, values, long_name, units in (
             ("force", ("wrench", "axis"), force, "force on the tip, base axes", "N"),
             ("moment", ("wrench", "axis"), moment, "moment on the tip, base axes", "N m"),
             ("minimum", ("minimum",), self.minimum, "lower bound of all tensions, as asked", "N"),
@@ -110,8 +110,8 @@ class Labelled(Cases):
             ("diameter", (), self.diameter, "diameter of the cables", "m"),
             ("direction_vector", ("direction", "axis"), self.direction, "unit vector", "1"),
         ):
-            if used.issuperset(of):
-                coordinates[name] = (of, values, {"long_name": long_name, "units": units})
+            if used.issuperset(along):
+                coordinates[name] = (along, values, {"long_name": long_name, "units": units})
         labels: dict[str, Sequence[object] | None] = {"cable": self.arm.cables.names, **self.names}
         labels |= dict.fromkeys(("axis", "axis_column"), XYZ)
         labels |= dict.fromkeys(("motion", "motion_column"), MOTION_NAMES)

@@ -89,21 +89,20 @@ class GridPoses(PoseSet):
     def __init__(
         self, angles: Mapping[str, ArrayLike], rest: Mapping[str, float] | None = None
     ) -> None:
-        given = angles
         still = {} if rest is None else rest
-        if not (isinstance(given, Mapping) and given and isinstance(still, Mapping)):
+        if not (isinstance(angles, Mapping) and angles and isinstance(still, Mapping)):
             problem = f"{angles!r} and rest {rest!r} given; mappings of joint names are needed."
             raise InvalidInput("angles", problem)
-        for name in given.keys() & still.keys():
+        for name in angles.keys() & still.keys():
             raise InvalidInput("rest", f"{name} is swept over; leave it out here.")
-        swept = {k: tuple(distinct(f"angles[{k!r}]", a).tolist()) for k, a in given.items()}
+        swept = {k: tuple(distinct(f"angles[{k!r}]", a).tolist()) for k, a in angles.items()}
         resting = {name: scalar(f"rest[{name!r}]", angle) for name, angle in still.items()}
         self.__dict__.update(swept=swept, resting=resting)
 
     def _of(self, arm: Manipulator) -> _Postures:
         q: dict[str, Any] = dict.fromkeys(arm.joint_names, 0.0)
-        for name, given in {**self.resting, **self.swept}.items():
-            q[one_of("joint", name, arm.joint_names)] = np.array(given)
+        for name, values in {**self.resting, **self.swept}.items():
+            q[one_of("joint", name, arm.joint_names)] = np.array(values)
 
         def angles(*parts: slice) -> Array:
             along = [q[name][part] for name, part in zip(self.swept, parts, strict=True)]
@@ -113,8 +112,8 @@ class GridPoses(PoseSet):
 
         coordinates: dict[str, Any] = {}
         for name, unit in zip(q, arm.joint_units, strict=True):
-            told = {"long_name": f"{'way' if unit == 'm' else 'angle'} of {name}", "units": unit}
-            coordinates[name] = ((name,) if name in self.swept else (), q[name], told)
+            about = {"long_name": f"{'way' if unit == 'm' else 'angle'} of {name}", "units": unit}
+            coordinates[name] = ((name,) if name in self.swept else (), q[name], about)
         sizes = {name: len(values) for name, values in self.swept.items()}
         return _Postures(sizes, angles, f"grid over {', '.join(sizes)}", coordinates)
 
@@ -149,14 +148,14 @@ class PathPoses(ReadOnlyState, PoseSet):
 
     def _of(self, arm: Manipulator) -> _Postures:
         q = _rows("waypoints", self.waypoints, arm)
-        known = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(q, axis=0), axis=1)))
-        way = known
+        waypoints = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(q, axis=0), axis=1)))
+        way = waypoints
         if self.count is not None:
-            way = np.linspace(0.0, known[-1], self.count)
-            q = np.column_stack([np.interp(way, known, column) for column in q.T])
-        told = {"long_name": "way along the path in joint space", "units": _unit(arm)}
-        description = f"path of {len(known)} waypoints"
-        distance = (("pose",), way, told)
+            way = np.linspace(0.0, waypoints[-1], self.count)
+            q = np.column_stack([np.interp(way, waypoints, angles) for angles in q.T])
+        about = {"long_name": "way along the path in joint space", "units": _unit(arm)}
+        description = f"path of {len(waypoints)} waypoints"
+        distance = (("pose",), way, about)
         return _Postures({"pose": len(q)}, q.__getitem__, description, {"distance": distance})
 
 
@@ -202,8 +201,8 @@ class RandomPoses(PoseSet):
 
 def joint_angles(arm: Manipulator, q: PoseSet | ArrayLike) -> Array:
     """Return the joint angles (N, nv) [rad] of a pose set or array, checked."""
-    found = _postures_of(arm, q)
-    return found.angles(*[_ALL] * len(found.sizes)).reshape(-1, arm.nv)
+    postures = _postures_of(arm, q)
+    return postures.angles(*[_ALL] * len(postures.sizes)).reshape(-1, arm.nv)
 
 
 def angles_of(
@@ -235,8 +234,8 @@ def angles_of(
         chunks = lazy.core.normalize_chunks(chunks, shape, limit=most, dtype=np.float64)
         values = lazy.map_blocks(block, chunks=chunks, meta=np.empty(0))
     if "pose" in sizes:
-        told = {"long_name": "number of the posture", "units": "1"}
-        coordinates |= {"pose": (("pose",), np.arange(sizes["pose"]), told)}
+        number = {"long_name": "number of the posture", "units": "1"}
+        coordinates |= {"pose": (("pose",), np.arange(sizes["pose"]), number)}
     about = {"long_name": "joint angles", "units": _unit(arm), "poses": description}
     return xarray.DataArray(values, coordinates, (*sizes, "joint"), attrs=about)
 

@@ -132,5 +132,5 @@ def _named(value: Any) -> tuple[Sequence[str] | None, Any]:
     """Return the names of several vectors, if they have any, and the vectors."""
     if isinstance(value, Mapping):
         return [text("name", name) for name in value], [*value.values()]
-    words = isinstance(value, (list, tuple)) and all(isinstance(each, str) for each in value)
+    words = isinstance(value, (list, tuple)) and all(isinstance(name, str) for name in value)
     return value if words else None, value
