@@ -104,9 +104,9 @@ class FileError(CdsmError, OSError):
 
 
 class GeometryError(CdsmError, ValueError):
-    """A geometry with ``faults``, a sentence each, or a URDF that is no arm, told in a text.
+    """The faults of a record (geometry, tolerances, wire, design problem), or of a URDF as a text.
 
-    ``source`` is the file of the geometry, or None.
+    ``faults`` has a sentence for each; ``source`` is the file of the record, or None.
     """
 
     status = Status.INVALID_INPUT

@@ -146,7 +146,7 @@ class Tolerances:
         try:
             table = read_toml(read_text(path))
             tolerances = table.get("tolerances", table)
-            return from_table(tolerances if isinstance(tolerances, dict) else table)
+            return tolerances_from(tolerances if isinstance(tolerances, dict) else table)
         except GeometryError as error:
             faults = listed(error.faults, 20, LINES)
             raise FileError(path, f"does not hold tolerances:{faults}") from None
@@ -154,7 +154,7 @@ class Tolerances:
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write a TOML file from which :meth:`read` builds equal tolerances, or FileError."""
         head = "# Tolerances of an arm, one sigma: rad, m, N, kg; rigidity and springs relative.\n"
-        return write_text(path, head + "\n" + toml_text(table_of(self)))
+        return write_text(path, head + "\n" + toml_text(tolerance_table(self)))
 
 
 def _checked(name: str, value: Any) -> tuple[Tolerance, ...]:
@@ -199,7 +199,7 @@ class _Entry:
         return Tolerance.within(self.within, correlation=rho, of=self.of)
 
 
-def from_table(table: Mapping[str, Any]) -> Tolerances:
+def tolerances_from(table: Mapping[str, Any]) -> Tolerances:
     """Build tolerances from a parsed TOML table; raise GeometryError that lists every fault."""
     if not isinstance(table, Mapping):
         raise GeometryError([f"is {table!r}; give a table [tolerances]"])
@@ -221,8 +221,8 @@ def from_table(table: Mapping[str, Any]) -> Tolerances:
     return Tolerances(**read)
 
 
-def table_of(tolerances: Tolerances) -> dict[str, list[dict[str, Any]]]:
-    """Return the table of TOML from which :func:`from_table` builds equal tolerances."""
+def tolerance_table(tolerances: Tolerances) -> dict[str, list[dict[str, Any]]]:
+    """Return the table of TOML from which :func:`tolerances_from` builds equal tolerances."""
     tables = {name: map(vars, parts) for name, parts in tolerances.given.items()}
     usual = "normal", EVERY
     return {

@@ -22,7 +22,7 @@ from cdsm.support.described import attributes_of, in_plain_text
 from cdsm.support.files import write_text
 from cdsm.support.records import one_line_each, toml_text, verbatim
 from cdsm.support.validation import sequence_of
-from cdsm.tolerances import table_of as tolerance_table
+from cdsm.tolerances import tolerance_table
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 from cdsm.wires.catalogue import WIRES, Wire, name_of, table_of

@@ -23,8 +23,7 @@ from cdsm.support import records
 from cdsm.support.files import read_text
 from cdsm.support.records import EACH, ONE, CrossFaults, laid_over, read_toml, record
 from cdsm.support.validation import gravity_vector, one_of
-from cdsm.tolerances import Tolerances
-from cdsm.tolerances import from_table as read_tolerances
+from cdsm.tolerances import Tolerances, tolerances_from
 from cdsm.wires.catalogue import WIRES, Wire, as_wire, from_table, is_file, read_law, table_of
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity
@@ -143,7 +142,7 @@ def _law_of(wire: Any, known: Mapping[str, Any]) -> Elasticity:
 
 
 _Gravity = Annotated[
-    Annotated[Any, Tag(ONE)] | Annotated[records.Direction, Tag(EACH)],
+    Annotated[Any, Tag(ONE)] | Annotated[records.Vector, Tag(EACH)],
     Discriminator(records.one_or_each),
     AfterValidator(lambda value: gravity_vector("gravity", value)),
 ]
@@ -173,14 +172,14 @@ def _with_settings(cls: type[_Record]) -> type[_Record]:
 class _Settings:
     wire: Any = None
     slack_below: bool | None = None
-    friction: records.Friction | None = None
+    friction: records.FrictionCoefficient | None = None
 
 
 @record
 class _Site:
     link: _Label
-    xyz: records.Point
-    friction: records.Friction | None = None
+    xyz: records.Position
+    friction: records.FrictionCoefficient | None = None
     wrap: records.Wrap = 0.0
 
 
@@ -301,7 +300,7 @@ class ArmFile(_Settings, _Wires):
     wire: Annotated[Any, AfterValidator(lambda wire, info: _law_of(wire, info.data))] = None
     gravity: _Gravity = GRAVITY
     original_length: Annotated[Any, AfterValidator(_unstrained)] = None
-    tolerances: Annotated[Tolerances, PlainValidator(read_tolerances)] = Tolerances()
+    tolerances: Annotated[Tolerances, PlainValidator(tolerances_from)] = Tolerances()
     springs: dict[str, records.PerJoint[records.Number]] | None = None
     geometry: Annotated[Any, PlainValidator(_described), Field(alias=_ROBOT)] = None
     urdf: Annotated[Urdf | None, AfterValidator(_alone)] = None

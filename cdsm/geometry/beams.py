@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self, cast
 
 from pydantic import Field, PlainValidator, model_validator
 
-from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, Limit, Link, Pieces
+from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, JointLimit, Link, Pieces
 from cdsm.support import records
 
 
@@ -24,7 +24,8 @@ class Beam:
     poisson: Annotated[records.Number, Field(ge=0.0, le=0.5)] = 0.3
     pieces: Pieces = 1
 
-    def _faults_of_beam(self) -> list[str]:
+    def faults_of_beam(self) -> list[str]:
+        """Return what is wrong with the stiffness or the diameters, a sentence each."""
         tube = self.outer_diameter, self.youngs_modulus
         if self.bending_stiffness is None and tube.count(None) == 1:
             return ["youngs_modulus: give it with outer_diameter, both or none of them"]
@@ -77,7 +78,7 @@ class Section:
     hole_angles: records.HoleAngles
     hole_radius: records.Length
     lead: records.LengthOrZero = 0.0
-    friction: records.Friction = 0.0
+    friction: records.FrictionCoefficient = 0.0
     disk_mass: records.Mass = 0.0
     disk_radius: records.Length | None = None
 
@@ -118,12 +119,12 @@ class Backbone(Beam):
         Field(min_length=1),
     ]
     mass_per_length: records.Mass = 0.0
-    joint_limit: Limit | None = None
+    joint_limit: JointLimit | None = None
     name: records.Name = "arm"
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        faults = self._faults_of_beam()
+        faults = self.faults_of_beam()
         if not faults and not self.stiffness():
             faults = ["bending_stiffness: give it, or outer_diameter and youngs_modulus"]
         if faults:

@@ -13,7 +13,7 @@ from cdsm.support import records
 from cdsm.support.values import Array
 
 MAXIMUM_JOINTS = 100
-Limit = Annotated[records.Number, Field(gt=0, le=math.pi)]
+JointLimit = Annotated[records.Number, Field(gt=0, le=math.pi)]
 Pieces = Annotated[records.Integer, Field(ge=1, le=20)]
 
 
@@ -43,9 +43,9 @@ class Joint:
         follows: Number of a joint before it, from 1, whose angles it copies; None: it is free.
     """
 
-    axes: Annotated[tuple[records.Direction, ...], Field(strict=False, max_length=2)] = ()
+    axes: Annotated[tuple[records.Vector, ...], Field(strict=False, max_length=2)] = ()
     disk_offset: records.Length
-    limit: Limit | None = None
+    limit: JointLimit | None = None
     hole_radius: records.Length | None = None
     disk_radius: records.Length | None = None
     stiffness: records.JointSpring = 0.0
@@ -110,7 +110,7 @@ class CableRoute:
     joint: Annotated[records.Integer, Field(ge=1)]
     angle: records.Number
     lead: records.LengthOrZero = 0.0
-    friction: records.Friction = 0.0
+    friction: records.FrictionCoefficient = 0.0
     radius: records.Length | None = None
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from cdsm.geometry.beams import Beam
-from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, Limit, Link
+from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, JointLimit, Link
 from cdsm.support import records
 from cdsm.support.records import EACH, ONE, PerJoint
 
@@ -86,8 +86,8 @@ class Universal(Beam):
     hole_radius: PerJoint[records.Length]
     link_mass: PerJoint[records.Mass]
     lead: PerJoint[records.LengthOrZero] = 0.0
-    friction: PerJoint[records.Friction] = 0.0
-    joint_limit: PerJoint[Limit] | None = None
+    friction: PerJoint[records.FrictionCoefficient] = 0.0
+    joint_limit: PerJoint[JointLimit] | None = None
     disk_radius: PerJoint[records.Length] | None = None
     cable_radius: PerJoint[records.Length] | None = None
     hole_angles: _HoleAngles | None = None
@@ -111,7 +111,7 @@ class Universal(Beam):
         ]
         if (angles is None) == (count is None) and (count or type(self) is Universal):
             faults.append("cables_per_joint: give it, or hole_angles, and not both")
-        faults += self._faults_of_beam()
+        faults += self.faults_of_beam()
         if faults:
             raise records.CrossFaults(faults)
         return self

@@ -77,7 +77,7 @@ Integer = Annotated[int, BeforeValidator(plain)]
 Number = Annotated[float, BeforeValidator(plain), Field(ge=-LARGEST, le=LARGEST)]
 Length = Annotated[Number, in_range("length")]
 LengthOrZero = Annotated[Number, in_range("length", zero=True)]
-Friction = Annotated[Number, in_range("friction", zero=True)]
+FrictionCoefficient = Annotated[Number, in_range("friction", zero=True)]
 Wrap = Annotated[Number, in_range("wrap", zero=True)]
 Mass = Annotated[Number, in_range("mass", zero=True)]
 JointSpring = Annotated[Number, in_range("spring", zero=True)]
@@ -89,8 +89,8 @@ Torsion = Annotated[
     in_range("bending stiffness", inf=True),
 ]
 Coordinate = Annotated[Number, Field(ge=-RANGES["length"].high, le=RANGES["length"].high)]
-Direction = Annotated[tuple[Number, Number, Number], Field(strict=False), BeforeValidator(plain)]
-Point = Annotated[
+Vector = Annotated[tuple[Number, Number, Number], Field(strict=False), BeforeValidator(plain)]
+Position = Annotated[
     tuple[Coordinate, Coordinate, Coordinate], Field(strict=False), BeforeValidator(plain)
 ]
 HoleAngles = Annotated[Sequence[Number], BeforeValidator(plain), Field(min_length=1, max_length=64)]

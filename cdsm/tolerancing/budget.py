@@ -108,7 +108,7 @@ class Uncertainty(Result, Plotted):
         tensions = "its own least tensions" if self.measurand.redistribute else "the tensions given"
         with_them = "" if self.measurand.quantity.needs == "posture" else f", each with {tensions}"
         lines = [
-            *self._unstable,
+            *self.stability_warnings,
             f"{self.name}: {self.shown} {unit} (one standard uncertainty, {relative:.2g} %)",
             f"95 % of such arms: {low:.4g} to {high:.4g} {unit}{with_them}",
             f"{'source':<16}{'tolerance':>16}{f'contribution [{unit}]':>24}{'of variance':>14}",
@@ -127,7 +127,7 @@ class Uncertainty(Result, Plotted):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings if the arm is UNSTABLE, or if first-order error propagation is insufficient."""
-        return self._unstable + self._nonlinear
+        return self.stability_warnings + self._nonlinear
 
     @property
     def shown(self) -> str:
@@ -135,7 +135,8 @@ class Uncertainty(Result, Plotted):
         return with_uncertainty(self.value, self.standard_uncertainty, self.measurand.unit[1])
 
     @property
-    def _unstable(self) -> tuple[str, ...]:
+    def stability_warnings(self) -> tuple[str, ...]:
+        """Warning that the arm is UNSTABLE, if the measurand is a stiffness."""
         K = self.measurand.stiffness
         has_stiffness = self.measurand.quantity.needs in ("stiffness", "stable arm")
         return (verdict(K),) if has_stiffness and not K.is_stable else ()

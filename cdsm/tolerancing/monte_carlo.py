@@ -99,7 +99,7 @@ class MonteCarlo(Result, Plotted):
         shown = with_uncertainty(self.mean, self.standard_uncertainty, size)
         word = "agrees with" if self.agrees else "differs from"
         lines = [
-            *self.budget._unstable,
+            *self.budget.stability_warnings,
             f"{self.budget.name}: {shown} {unit}, {self.values.size} draws",
             f"95 % of the draws: {low:.4g} to {high:.4g} {unit}, which {word} first order "
             f"({first[0]:.4g}, {first[1]:.4g})",
