@@ -92,75 +92,151 @@ def read_tensile_csv(
         checked_quantity("gauge_length", gauge_length, "length")
     if decimal not in (None, ".", ","):
         raise InvalidInput("decimal", f"{decimal!r} given; it is '.' or ','.")
+    sheet = _read_sheet(path, decimal)
+    header = _find_header(sheet, columns)
+    displacement, force = (
+        _find_column(sheet, header, kind, places, unit)
+        for kind, places, unit in zip(_UNITS, header.columns, units or (None, None), strict=True)
+    )
+    rows = _rows_of_numbers(sheet, header, (displacement.place, force.place))
+    length = _gauge_length(sheet, header) if gauge_length is None else gauge_length
+    source = " and ".join(repr(sheet.rows[header.row][c.place]) for c in (displacement, force))
+    source += f" of line {sheet.lines[header.row]}"
+    strained = displacement.unit in _STRAINS
+    if length is None:
+        if not strained:
+            sheet.refuse("has no gauge length; give one, or add a line # gauge_length = 500 mm.")
+        length = 1.0
+        source += "; no gauge length: displacements are those of 1 m of wire"
+    to_m = displacement.factor * (length if strained else 1.0)
+    u = np.array([sheet.values[k][displacement.place] for k in rows])
+    F = np.array([sheet.values[k][force.place] for k in rows])
+    return TensileTest(frozen(to_m * u), frozen(force.factor * F), length, source)
+
+
+class _Sheet(NamedTuple):
+    """The cells of a file, as texts and as numbers."""
+
+    path: str | os.PathLike[str]
+    lines: list[int]  # number of the line of each row in the file
+    rows: list[list[str]]
+    values: list[list[float]]  # the numbers in the cells; NaN where there is none
+    comments: list[str]
+    delimiter: str
+    decimal: str | None
+
+    def refuse(self, problem: str) -> NoReturn:
+        """Raise FileError."""
+        raise FileError(self.path, problem)
+
+
+class _Header(NamedTuple):
+    """A row that may name the columns of a test, and what is below it."""
+
+    row: int
+    units: list[str]  # cells of the row of units below it, if there is one
+    first: int  # first row of numbers
+    points: int  # rows of numbers
+    columns: tuple[list[int], list[int]]  # that may be the displacement, and the force
+
+    @property
+    def names_both(self) -> bool:
+        """Whether it names displacement and force, and not both by one column."""
+        displacements, forces = self.columns
+        return bool(displacements and forces and displacements != forces)
+
+
+class _Column(NamedTuple):
+    """A column of a test."""
+
+    place: int
+    unit: str
+    factor: float  # to m, strains or N
+
+
+def _read_sheet(path: str | os.PathLike[str], decimal: str | None) -> _Sheet:
     table = read_table(path, ";\t,", any_encoding=True)
-    micro = [(line, [cell.replace("μ", "µ") for cell in row]) for line, row in table.rows]
-    table = table._replace(rows=micro)  # not the Greek letter
-
-    def refuse(problem: str) -> NoReturn:
-        raise FileError(path, problem)
-
-    rows = [row for _, row in table.rows]
+    rows = [[cell.replace("μ", "µ") for cell in row] for _, row in table.rows]  # no Greek letter
     values = [[_number(cell, table.delimiter, decimal) for cell in row] for row in rows]
-    counts = [int(np.isfinite(row).sum()) for row in values]
-    heads = []
-    for at, (line, row) in enumerate(table.rows):
-        if line <= _HEADERS and not counts[at]:
-            below = [cell.strip("[]() ") for cell in rows[at + 1]] if at + 1 < len(rows) else []
-            below = [] if _KNOWN.isdisjoint(below) else below  # the units
-            first = at + 1 + bool(below)
-            points = next((k for k in range(first, len(rows)) if counts[k] < 2), len(rows)) - first
-            fit = _fitting(row, columns)
-            heads.append((all(fit) and fit[0] != fit[1], points, -at, first, below, fit))
-    found, _, at, first, below, fit = max(heads, default=(False, 0, 0, 0, [], ([], [])))
-    names = rows[-at] if rows else []
-    if not found:
-        refuse(
+    lines = [line for line, _ in table.rows]
+    return _Sheet(path, lines, rows, values, [*table.comments], table.delimiter, decimal)
+
+
+def _find_header(sheet: _Sheet, columns: Sequence[str] | None) -> _Header:
+    """Return the first header that names both columns above the most rows of numbers."""
+    counts = [int(np.isfinite(row).sum()) for row in sheet.values]
+    headers = []
+    for row, (line, cells) in enumerate(zip(sheet.lines, sheet.rows, strict=True)):
+        if line <= _HEADERS and not counts[row]:
+            below = sheet.rows[row + 1] if row + 1 < len(sheet.rows) else []
+            units = [cell.strip("[]() ") for cell in below]
+            units = [] if _KNOWN.isdisjoint(units) else units
+            first = row + 1 + bool(units)
+            end = next((k for k in range(first, len(counts)) if counts[k] < 2), len(counts))
+            headers.append(_Header(row, units, first, end - first, _fitting(cells, columns)))
+    best = max(headers, key=lambda header: (header.names_both, header.points), default=None)
+    if best is None or not best.names_both:
+        names = sheet.rows[best.row if best else 0] if sheet.rows else []
+        sheet.refuse(
             f"has no header that names {' and '.join(columns or ('displacement', 'force'))} in "
             f"its first {_HEADERS} lines; there are {', '.join(names) or 'none'}; which columns?"
         )
-    at = -at
-    chosen = []
-    for kind, places, given in zip(_UNITS, fit, units or (None, None), strict=True):
-        if len(places) > 1:
-            several = " and ".join(names[k] for k in places)
-            refuse(f"{several} may both be the {kind}; give one as columns.")
-        known = _UNITS[kind]
-        place = places[0]
-        written = [_name_and_unit(names[place])[1], *below[place : place + 1]]
-        unit = next((each for each in (*written, given) if each in known), None)
-        if unit is None or given not in (None, unit):
-            refuse(
-                f"has the {kind} {names[place]!r} in {' '.join(written).strip() or 'no unit'}, and "
-                f"{given or 'none'} is given as units; give one of {', '.join(known)}."
-            )
-        chosen.append((place, unit, known[unit]))
-    (x, x_unit, to_m), (y, _, to_N) = chosen
-    ends = [k for k, row in enumerate(rows) if len(row) > max(x, y) and re.search(r"\d", row[y])]
-    kept = range(first, max(ends, default=0) + 1)  # text below has no number
-    for k in kept:
-        line, row = table.rows[k]
-        for place in (x, y):
+    return best
+
+
+def _find_column(
+    sheet: _Sheet, header: _Header, kind: str, places: list[int], unit: str | None
+) -> _Column:
+    """Return the only column of a kind, with its unit; ``unit`` is that of the argument."""
+    names = sheet.rows[header.row]
+    if len(places) > 1:
+        several = " and ".join(names[place] for place in places)
+        sheet.refuse(f"{several} may both be the {kind}; give one as columns.")
+    known = _UNITS[kind]
+    place = places[0]
+    written = [_name_and_unit(names[place])[1], *header.units[place : place + 1]]
+    read = next((text for text in (*written, unit) if text in known), None)
+    if read is None or unit not in (None, read):
+        sheet.refuse(
+            f"has the {kind} {names[place]!r} in {' '.join(written).strip() or 'no unit'}, and "
+            f"{unit or 'none'} is given as units; give one of {', '.join(known)}."
+        )
+    return _Column(place, read, known[read])
+
+
+def _rows_of_numbers(sheet: _Sheet, header: _Header, places: tuple[int, int]) -> range:
+    """Return the rows of the test, of which both cells are numbers; text below is no part of it."""
+    names = sheet.rows[header.row]
+    last = 0
+    for k, row in enumerate(sheet.rows):
+        if len(row) > max(places) and re.search(r"\d", row[places[1]]):
+            last = k
+    rows = range(header.first, last + 1)
+    for k in rows:
+        row = sheet.rows[k]
+        for place in places:
             cell = row[place] if place < len(row) else ""
-            if not math.isfinite(_number(cell, table.delimiter, decimal)):
+            if not math.isfinite(_number(cell, sheet.delimiter, sheet.decimal)):
                 mark = _MARK * ("," in cell)
-                refuse(f"line {line}: {cell!r} under {names[place]!r} is no number.{mark}")
+                sheet.refuse(
+                    f"line {sheet.lines[k]}: {cell!r} under {names[place]!r} is no number.{mark}"
+                )
         if any(row[len(names) :]):
-            refuse(f"line {line}: {table.delimiter.join(row)!r} has too many cells.{_MARK}")
-    text = "".join(rows[k][place] for k in kept for place in (x, y))
-    if not decimal and table.delimiter != "," and {",", "."} <= set(text):
-        refuse(f"has numbers with commas and with points.{_MARK}")
-    for said in _GAUGE.finditer("\n".join([*table.comments, *map(" ".join, rows[:at])])):
-        if gauge_length is None and (unit := said[1] or said[3]):
-            gauge_length = _number(said[2], ";", decimal) * _LENGTHS[unit.lower()]
-    source = f"{names[x]!r} and {names[y]!r} of line {table.rows[at][0]}"
-    if gauge_length is None:
-        if x_unit not in _STRAINS:
-            refuse("has no gauge length; give one, or add a line # gauge_length = 500 mm.")
-        gauge_length = 1.0
-        source += "; no gauge length: displacements are those of 1 m of wire"
-    to_m *= gauge_length if x_unit in _STRAINS else 1.0
-    u, F = (np.array([values[k][place] for k in kept]) for place in (x, y))
-    return TensileTest(frozen(to_m * u), frozen(to_N * F), gauge_length, source)
+            cells = sheet.delimiter.join(row)
+            sheet.refuse(f"line {sheet.lines[k]}: {cells!r} has too many cells.{_MARK}")
+    text = "".join(sheet.rows[k][place] for k in rows for place in places)
+    if not sheet.decimal and sheet.delimiter != "," and {",", "."} <= set(text):
+        sheet.refuse(f"has numbers with commas and with points.{_MARK}")
+    return rows
+
+
+def _gauge_length(sheet: _Sheet, header: _Header) -> float | None:
+    """Return the gauge length [m] above the header or in a comment; None if there is none."""
+    above = map(" ".join, sheet.rows[: header.row])
+    for match in _GAUGE.finditer("\n".join([*sheet.comments, *above])):
+        if unit := match[1] or match[3]:
+            return _number(match[2], ";", sheet.decimal) * _LENGTHS[unit.lower()]
+    return None
 
 
 def _fitting(row: list[str], columns: Sequence[str] | None) -> tuple[list[int], list[int]]:
