@@ -29,7 +29,10 @@ class CableLaws:
     ElasticityRangeError names the cables whose tension is outside their law.
 
     Args:
-        cables: Cables of the arm.
+        cables: Cables of the arm, or its segments.
+        whole: Whether they are whole cables: a series spring that stretches by more than the whole
+            cable leaves no wire, which :meth:`stiffness` refuses. The spring in the first segment
+            of a cable may be longer than this segment.
 
     Attributes:
         held: Each distinct law of the position-controlled cables, with the indices of its cables.
@@ -40,8 +43,9 @@ class CableLaws:
         linear: Whether a cable is one of these (C,), as 1 or 0: EA (1 + ε) is then EA + F.
     """
 
-    def __init__(self, cables: tuple[Cable, ...]) -> None:
+    def __init__(self, cables: tuple[Cable, ...], *, whole: bool = True) -> None:
         self._cables = cables
+        self._whole = whole
         locked = [(c, each) for c, each in enumerate(cables) if each.control == "position"]
         # usually all cables have one law, and a slice is faster than indices
         self.held = [
@@ -68,23 +72,46 @@ class CableLaws:
 
     def stiffness(self, lengths: Array, tension: Array) -> Array:
         """Compute 1/(l_0/EA(F) + 1/k_series) (C,) [N/m] at L and F (C,); 0: force-controlled."""
-        stretched = self.rigidities(tension)
-        if self.nonlinear and stretched.min() < 0.0:
+        rigidities = self.rigidities(tension)
+        k = self.stiffness_of(lengths, tension, rigidities)
+        if k.min() < 0.0:
             for law, of in self.nonlinear:
                 self._evaluate(law, of, tension[of])
-        return frozen(self.stiffness_of(lengths, tension, stretched))
+            self.require_wire(self.original_lengths(lengths, tension), tension)
+        return frozen(k)
 
     def stiffness_of(
-        self, lengths: Array, tension: Array, stretched: Array, series: Array | None = None
+        self, lengths: Array, tension: Array, rigidities: Array, series: Array | None = None
     ) -> Array:
         """Compute the same (…, C) from EA (1 + ε) (…, C), as :meth:`rigidities` gives it.
 
-        −1 stays where a tension is outside its law. ``series`` replaces the arm's own 1/k_series.
+        It is −1 where a tension is outside its law, or a spring leaves no wire. ``series`` replaces
+        the arm's own 1/k_series.
         """
         series = self.series if series is None else series
         wire = lengths - series * (tension - self.rest)
+        exists = rigidities > 0.0
         with np.errstate(divide="ignore"):
-            return np.where(stretched > 0.0, 1.0 / (wire / stretched + series), stretched)
+            k = np.where(exists, 1.0 / (wire / rigidities + series), rigidities)
+        return np.where(exists & (wire <= 0.0), -1.0, k) if self._whole else k
+
+    def require_wire(self, original_lengths: Array, tension: Array) -> None:
+        """Raise ElasticityRangeError if l_0 (C,) [m] of a cable under F (C,) [N] is 0 or less."""
+        lost = np.flatnonzero(original_lengths <= 0.0)
+        if lost.size:
+            problem = "stretches the series spring by more than the whole cable: no wire is left. "
+            problem += "Give the cable a longer lead, a stiffer spring or less tension."
+            error = ElasticityRangeError(problem, tension[lost].tolist(), lost.tolist())
+            raise self.naming(error, slice(None))
+
+    def largest_tensions(self, lengths: Array) -> Array:
+        """Compute the tensions (C,) [N] at which springs leave no wire of cables of length L.
+
+        They are inf for cables without a spring and for force-controlled ones.
+        """
+        locked = [cable.control == "position" for cable in self._cables]
+        with np.errstate(divide="ignore"):
+            return np.where(locked, self.rest + lengths / self.series, np.inf)
 
     def rigidities(self, tension: Array) -> Array:
         """Compute EA (1 + ε) (…, C) [N] at F (…, C): 0: force-controlled; −1: outside, or NaN."""

@@ -87,7 +87,7 @@ class Chains:
             friction=frozen(friction.copy()),
             wrap=frozen(wrap.copy()),
             routing=Routing.of(body, segments, every=True),
-            laws=CableLaws(tuple(segments)),
+            laws=CableLaws(tuple(segments), whole=False),
         )
 
 

@@ -80,7 +80,7 @@ def show_stiffness(
     stuck, sticking = _sticking(K.distribution, axes)
     parts = [head, rest or K.distribution, K, *lines, *stuck, *sure]
     output = numbers | K.to_dict() | (rest.to_dict() if rest else {}) | sticking | uncertainty
-    warnings = K.warnings[:1] + (rest.warnings if rest else ())
+    warnings = K.warnings + (rest.warnings if rest else ())
     return answer(as_json, output, *parts, warnings=warnings)
 
 

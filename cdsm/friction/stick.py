@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 from cdsm.friction.capstan import ChainProblem, assemble_segments, can_stick
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, checked_tension, stiffness
+from cdsm.stiffness_matrix.prints import verdict
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import SMALLEST, Direction, unit_direction
@@ -211,13 +212,13 @@ class RestBand(Result):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that say where first order misleads; empty if there are none."""
-        said = () if self.stiffness.is_stable else self.stiffness.warnings[:1]
+        warnings = [] if self.stiffness.is_stable else [verdict(self.stiffness)]
         if self.half_width > _WIDE * self.stiffness.posture.arm.length:
-            said += (
+            warnings.append(
                 f"FAR TOO WIDE: ±{1e3 * self.half_width:.3g} mm is more than "
-                f"{100.0 * _WIDE:g} % of the arm's length; near buckling the tip rests closer.",
+                f"{100.0 * _WIDE:g} % of the arm's length; near buckling the tip rests closer."
             )
-        return said
+        return tuple(warnings)
 
     def __str__(self) -> str:
         rough = self.stiffness.posture.segments.chains.friction.max(initial=0.0) > 0.1

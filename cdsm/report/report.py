@@ -10,8 +10,9 @@ import numpy as np
 from cdsm.errors import CdsmError, SingularStiffness, listed
 from cdsm.friction.stick import breakaway
 from cdsm.report import checks
+from cdsm.report.remedies import find_remedies
 from cdsm.stiffness_matrix import Report, Stiffness
-from cdsm.stiffness_matrix.prints import missing_leads
+from cdsm.stiffness_matrix.prints import verdict
 
 
 def report_on(K: Stiffness) -> Report:
@@ -20,7 +21,8 @@ def report_on(K: Stiffness) -> Report:
     condition = float(np.linalg.cond(K.joint * scale[:, None] * scale))
     balance = checks.balance_error(K)
     optimality = checks.optimality(K)
-    measured = Report(K, checks.compared(K), *balance, *optimality, condition)
+    remedies = () if K.is_stable else tuple(find_remedies(K))
+    measured = Report(K, checks.compared(K), *balance, *optimality, condition, remedies)
     return replace(measured, faults=tuple(_faults(measured)), notes=tuple(_notes(measured)))
 
 
@@ -45,7 +47,7 @@ def _faults(report: Report) -> Iterator[str]:
             f"{report.imbalance:.1e} of the torques; distribute_tension finds tensions that do."
         )
     if not K.is_stable:
-        yield " ".join(map(str.strip, K.warnings))
+        yield ". ".join([verdict(K), *map(str, report.remedies)])
     elif report.condition > 1e12:  # singular but for rounding
         yield f"the arm is about to buckle: K_θ has the condition number {report.condition:.2g}."
     violation = report.bound_violation or 0.0
@@ -59,7 +61,7 @@ def _notes(report: Report) -> Iterator[str]:
     K = report.stiffness
     pose = report.stiffness.posture
     arm = report.stiffness.posture.arm
-    yield from (*pose.remarks, *missing_leads(K))
+    yield from pose.remarks
     if report.bound_violation is None:
         came = "were given" if K.free_length is None else "follow from an equilibrium"
         yield f"the tensions {came}, not distributed: they need not be the least."

@@ -63,15 +63,11 @@ class LockedArm:
         length = L
         if rest_length is not None:  # at ``tension``, wire and spring have their rest lengths
             own = length = np.where(reference.arm.cables.position_controlled, rest_length, L)
+        laws.require_wire(own, tension)
         self.rest_length = frozen(own)
         for law, of in laws.held:
             F = tension[of]
             locked = _LockedLaw(law, of, own[of], laws.series[of], F, law.strain(F), length[of])
-            none = np.flatnonzero(locked.elongation(np.full(F.shape, law.low))[1] <= 0.0)
-            if none.size:
-                said = "stretches the series spring by more than the whole cable: no wire is left. "
-                said += "Give the cable a longer lead, a stiffer spring or less tension."
-                raise laws.naming(ElasticityRangeError(said, F[none].tolist(), none.tolist()), of)
             self._laws.append(locked)
 
     def under(self, wrench: Array) -> LockedArm:

@@ -7,8 +7,8 @@ K_θ = H_L·F + J_Lᵀ K_L J_L + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ             
 from cdsm.stiffness_matrix.assembly import assemble as assemble
 from cdsm.stiffness_matrix.assembly import checked_tension as checked_tension
 from cdsm.stiffness_matrix.assembly import stiffness as stiffness
-from cdsm.stiffness_matrix.prints import Remedy as Remedy
 from cdsm.stiffness_matrix.report import Comparison as Comparison
+from cdsm.stiffness_matrix.report import Remedy as Remedy
 from cdsm.stiffness_matrix.report import Report as Report
 from cdsm.stiffness_matrix.shares import Shares as Shares
 from cdsm.stiffness_matrix.value import Friction as Friction

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from io import StringIO
-from typing import TYPE_CHECKING, Literal, final
+from typing import TYPE_CHECKING, Final, Literal, final
 
-from cdsm.support.format import merged, prepare_json
+from cdsm.support.format import merged, prepare_json, rounded
 from cdsm.support.result import Result, unit
 
 if TYPE_CHECKING:
@@ -46,6 +46,30 @@ class Comparison:
     reason: str
 
 
+_QUANTITIES: Final = {"wire": "EA of wires", "spring": "k_series", "tension": "lower bounds"}
+
+
+@final
+@dataclass(frozen=True)
+class Remedy:
+    """Change of one quantity of an unstable arm; of :attr:`Report.remedies`.
+
+    ``change`` is ``"wire"``: EA of all wires; ``"spring"``: all k_series; ``"tension"``: the lower
+    bounds. ``factor`` [-] is the one nearest to 1 at which the arm becomes stable, None if none is.
+    """
+
+    change: Literal["wire", "spring", "tension"]
+    factor: float | None
+
+    def __str__(self) -> str:
+        what = _QUANTITIES[self.change]
+        s = self.factor
+        if s is None:
+            return f"no other {what} alone would hold it"
+        times = f"{rounded(s, up=s > 1.0)} times as high, or {'more' if s > 1.0 else 'less'}"
+        return f"it would hold with {what} {times}"
+
+
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Report(Result):
@@ -63,6 +87,8 @@ class Report(Result):
         kkt_residual: min ‖F + J_L λ − μ + ν‖/‖F‖ [-] of Eq. 17 over the multipliers λ of the
             balance, μ ≥ 0 and ν ≥ 0 of the bounds; None if the tensions need not be the least.
         condition: Condition number of K_θ [-], made dimensionless with the arm's length.
+        remedies: Changes that would make an unstable arm stable, each alone; empty for a stable
+            arm, and if friction makes it unstable.
         faults: Reasons not to use the stiffness, one text each; empty if there are none.
         notes: Notes on how to read the stiffness, one text each, e.g. that a cable is slack.
     """
@@ -75,6 +101,7 @@ class Report(Result):
     bound_violation: float | None = field(metadata=unit("1"))
     kkt_residual: float | None = field(metadata=unit("1"))
     condition: float = field(metadata=unit("1"))
+    remedies: tuple[Remedy, ...] = ()
     faults: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -87,7 +114,8 @@ class Report(Result):
         """Return the report and :meth:`Stiffness.to_dict` in SI for JSON, units in the keys."""
         verdict = {"passed": self.passed, "faults": self.faults, "notes": self.notes}
         comparisons = {"comparisons": [asdict(comparison) for comparison in self.comparisons]}
-        parts = prepare_json(verdict), prepare_json(comparisons), super().to_dict()
+        remedies = {"remedies": {remedy.change: remedy.factor for remedy in self.remedies}}
+        parts = prepare_json(verdict | comparisons | remedies), super().to_dict()
         return merged(self.stiffness.to_dict(), *parts)
 
     def to_html(self, about: str = "") -> str:

@@ -20,7 +20,7 @@ from cdsm import readings
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints
-from cdsm.stiffness_matrix.prints import Remedy, find_remedies, verdict
+from cdsm.stiffness_matrix.prints import verdict
 from cdsm.stiffness_matrix.report import Report
 from cdsm.stiffness_matrix.shares import Shares
 from cdsm.support.format import coordinates, merged, prepare_json
@@ -307,19 +307,13 @@ class Stiffness(Result):
             warnings=() if self.is_stable else (verdict(self),),
         )
 
-    @cached_property
-    def remedies(self) -> tuple[Remedy, ...]:
-        """Changes that would make an unstable arm stable, each alone; empty for a stable arm.
-
-        Stiffer wires, stiffer springs and, of distributed tensions, other lower bounds are tried at
-        the same posture and wrench. This takes a few tenths of a second.
-        """
-        return () if self.is_stable else tuple(find_remedies(self))
-
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Lines that say that the arm is UNSTABLE, with its remedies; empty for a stable arm."""
-        return () if self.is_stable else (verdict(self), *map(str, self.remedies))
+        """A line that says that the arm is UNSTABLE; empty for a stable arm.
+
+        ``report().remedies`` are changes that would hold it.
+        """
+        return () if self.is_stable else (verdict(self),)
 
     def report(self) -> Report:
         """Check this frictionless stiffness: is it right, balanced, stable, and how to read it."""

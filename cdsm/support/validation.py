@@ -209,6 +209,8 @@ def _native(name: str, value: ArrayLike) -> Array:
         raise InvalidInput(
             name, f"a {type(value).__name__} given; give its numbers alone, in order, as an array."
         )
+    if isinstance(value, np.ma.MaskedArray):
+        raise InvalidInput(name, "has a mask; fill or leave out its masked entries first.")
     try:
         array = np.asarray(value)
     except (TypeError, ValueError) as error:  # rows of different lengths

@@ -16,6 +16,8 @@ from cdsm.support import validation
 from cdsm.support.validation import bound, flag, one_of
 from cdsm.support.values import Array, frozen
 
+_WIRE = 1.0 - 1e-9  # of the tension at which a spring leaves no wire
+
 
 class Bounds(NamedTuple):
     """Bounds of the tensions at a posture, (C,) [N] each.
@@ -45,7 +47,8 @@ def bounds_at(
     """Check the bounds that were asked for, and compute those that hold at a posture.
 
     The cables' own bounds narrow them; ``worst_friction`` narrows them by exp(Σ μ φ) of the holes,
-    and ``within_laws`` to the domains of the laws of position-controlled cables. ``fixed`` tensions
+    and ``within_laws`` to the domains of the laws of position-controlled cables, and to tensions at
+    which their springs leave wire. ``fixed`` tensions
     [N] by cable replace both bounds. Raises InvalidInput if bounds contradict each other; those
     ``within_laws`` may, for then no tensions are within the laws.
     """
@@ -62,6 +65,7 @@ def bounds_at(
             for cable in arm.cables
         ]
         first, last = np.transpose(domains)
+        last = np.minimum(last, _WIRE * arm.laws.largest_tensions(pose.cable_lengths))
         low = frozen(np.maximum(low, first))
         high = frozen(np.minimum(high, last))
     if fixed:

@@ -16,6 +16,7 @@ from cdsm.friction.capstan import can_stick
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture
+from cdsm.report.remedies import find_remedies
 from cdsm.statics.equilibrium import Equilibrium
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.status import Status
@@ -138,9 +139,9 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
             results["stiffness"] = K = stiffness(pose, tension)
             _ = K.compliance  # raises if K_θ is singular
             if not K.is_stable:
-                warnings = "\n".join(K.warnings)  # takes tenths of a second: what would stabilise
-                return Shown(**results, status=Status.UNSTABLE, problem=warnings)
-            return Shown(**results, status=Status.OK, problem="\n".join(pose.remarks))
+                remedies = map(str, find_remedies(K))  # takes tenths of a second
+                problem = "\n".join([*K.warnings, *remedies])
+                return Shown(**results, status=Status.UNSTABLE, problem=problem)
         locked = cdsm.stuck_stiffness if arm.has_friction else stiffness
         stable = locked(pose, tension).is_stable
         rest, results["sliding"] = _rest(pose, tension, force)

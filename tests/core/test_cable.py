@@ -9,6 +9,8 @@ import pytest
 
 import cdsm
 from cdsm import presets
+from cdsm.status import Status
+from tests.support import locked
 from tests.support.arms import STEEL, random_arm, random_posture
 
 STRAND = presets.STRAND_1X19
@@ -86,3 +88,21 @@ def test_only_holes_have_friction(keys: dict[str, Any]) -> None:
         cdsm.Cable("a", (rough[0], plain[1]), STEEL)
     with pytest.raises(cdsm.InvalidInput, match=r"site 2 .*ends there"):
         cdsm.Cable("a", (plain[0], rough[1]), STEEL, lead=0.1)
+
+
+def test_spring_that_stretches_by_more_than_its_cable_is_refused() -> None:
+    """k = 1/(l_0/EA + 1/k_series) would be above k_series: the cable stiffer than its spring."""
+    k_series = 2e3
+    arm = locked.hinge()
+    soft = [dataclasses.replace(cable, series_stiffness=k_series) for cable in arm.cables]
+    pose = arm.with_cables(soft).at([0.0])
+    edge = k_series * pose.cable_lengths[1]  # tension at which no wire is left
+    below = cdsm.stiffness(pose, [10.0, 0.999 * edge])
+    assert 0.0 < below.cable_stiffness[1] < k_series
+    for read in (cdsm.stiffness, cdsm.equilibrium, cdsm.load_cycle):
+        more = (np.zeros((1, 6)),) if read is cdsm.load_cycle else ()
+        with pytest.raises(cdsm.ElasticityRangeError, match=r"cable1_2.*no wire is left"):
+            read(pose, [10.0, 1.001 * edge], *more)  # type: ignore[operator]
+    batch = cdsm.evaluate(pose.arm, [[0.0], [0.0]], [[10.0, 0.999 * edge], [10.0, 1.001 * edge]])
+    assert batch.ok.tolist() == [True, False]
+    assert batch.status[1] == Status.OUTSIDE_ELASTICITY
