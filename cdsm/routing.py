@@ -51,7 +51,7 @@ class Routing:
     """Sites of cables on the bodies of a tree, and the segments between them.
 
     Attributes:
-        nv: Number of joints.
+        joint_count: Number n of all joints; nv of them are independent.
         row: Row of the joint that moves each site (P,); the base is 0.
         point: Position of each site in the frame of this joint (P, 3) [m].
         cable: Cable of each segment (S,).
@@ -63,7 +63,7 @@ class Routing:
         coupling: How the joints follow from the independent ones; None: all are independent.
     """
 
-    nv: int
+    joint_count: int
     row: Indices
     point: Array
     cable: Indices
@@ -115,7 +115,7 @@ class Routing:
                 path[s, i], sign[s, i] = step
         cable_of, end = (np.array([each[i] for each in segments], np.intp) for i in (0, 1))
         return cls(
-            nv=len(body.all_joints),
+            joint_count=len(body.all_joints),
             row=frozen(np.array(row, np.intp)),
             point=frozen(np.array(point)),
             cable=frozen(cable_of),
@@ -136,7 +136,7 @@ class Routing:
         return np.column_stack([self.point, np.ones(len(self.point))])
 
     def spans(self, twist: Array, site: Array) -> Spans:
-        """Compute the segments from the world twists (6, nv) and the sites (3, P)."""
+        """Compute the segments from the world twists (6, n) and the sites (3, P)."""
         b = site[:, self.second]
         w = b - site[:, self.first]
         length = np.sqrt(dot(w, w))
@@ -153,8 +153,8 @@ class Routing:
         """Compute J_L = ∂L/∂θ (C, nv)."""
         real, to = self._rates
         C = len(self.fixed)
-        J = _sum(to, spans.rate[real], C * self.nv)
-        return self.reduced(J.reshape(C, self.nv))
+        J = _sum(to, spans.rate[real], C * self.joint_count)
+        return self.reduced(J.reshape(C, self.joint_count))
 
     def reduced(self, J: Array) -> Array:
         """Return derivatives (n, …) by the independent joints, from those by all of them."""
@@ -168,8 +168,8 @@ class Routing:
         """Compute the same sums for each of ``count`` groups of segments (count, nv, nv)."""
         segment, source, target = self._pairs
         pairs = self._products(spans, weight)[source]
-        H = _sum(group[segment] * self.nv**2 + target, pairs, count * self.nv**2)
-        H = H.reshape(count, self.nv, self.nv)
+        H = _sum(group[segment] * self.joint_count**2 + target, pairs, count * self.joint_count**2)
+        H = H.reshape(count, self.joint_count, self.joint_count)
         return self.coupling.square(H) if self.coupling else H
 
     def _products(self, spans: Spans, weight: Array) -> Array:
@@ -182,11 +182,11 @@ class Routing:
     def _rates(self) -> tuple[NDArray[np.bool_], Indices]:
         """Which entries of ``path`` are joints, and where they are in J_L."""
         real = self.sign != 0.0
-        return real, (self.cable[:, None] * self.nv + self.path)[real]
+        return real, (self.cable[:, None] * self.joint_count + self.path)[real]
 
     @cached_property
     def _pairs(self) -> tuple[Indices, Indices, Indices]:
-        """For each entry of a Hessian: its segment, its product, and its place in (nv, nv)."""
+        """For each entry of a Hessian: its segment, its product, and its place in (n, n)."""
         S, m = self.path.shape
         real = self.sign != 0.0
         p, q = np.triu_indices(m)
@@ -199,7 +199,7 @@ class Routing:
         return (
             np.concatenate([segment, segment[off]]),
             np.concatenate([source, source[off]]),
-            np.concatenate([i * self.nv + j, (j * self.nv + i)[off]]),
+            np.concatenate([i * self.joint_count + j, (j * self.joint_count + i)[off]]),
         )
 
 

@@ -128,7 +128,6 @@ class Segments(ReadOnlyState):
         routing = chains.routing
         spans = routing.spans(twist, routing.sites(placement))
         hole = chains.hole
-        nv = routing.nv
         u = spans.direction[:, hole]
         v = spans.direction[:, hole + 1]
         normal = cross(u, v)
@@ -139,7 +138,7 @@ class Segments(ReadOnlyState):
         # from the end at the hole to the other one, the first site
         along = (spans.length * spans.direction)[:, :, None]
         back = spans.motion - cross(spans.axis, along)
-        gradient = np.zeros((hole.size, nv))
+        gradient = np.zeros((hole.size, routing.joint_count))
         rows = np.arange(hole.size)[:, None]
         np.subtract.at(gradient, (rows, routing.path[hole]), dot(p[:, :, None], back[:, hole]))
         turned = dot(q[:, :, None], spans.motion[:, hole + 1])
