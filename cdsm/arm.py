@@ -55,9 +55,9 @@ class ComputedArm(Printed):
 
         Raises InvalidInput if a cable, the tip, a spring or a joint name does not fit the URDF.
         """
-        return cls.__new__(cls)._compute(definition, like)
+        return cls.__new__(cls).compute(definition, like)
 
-    def _compute(self, definition: ArmDefinition, like: Self | None = None) -> Self:
+    def compute(self, definition: ArmDefinition, like: Self | None = None) -> Self:
         """Set the definition, and compute what follows from it."""
         if like is not None and definition.has_body_of(like.definition):
             body = like.body
@@ -216,13 +216,13 @@ class ComputedArm(Printed):
             require_within_limits(self.body, q)
         return q
 
-    def _require_apart(self, length: Array, q: Array) -> None:
+    def require_apart(self, length: Array, q: Array) -> None:
         """Raise InvalidInput if a segment, of the ``length`` (S,) [m], has no direction."""
         if length.min(initial=math.inf) < SHORTEST_SEGMENT:
             cable = self.cables[int(self.routing.cable[length.argmin()])]
-            said = f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
-            said += "direction there. Move a site, or change the posture."
-            raise InvalidInput(f"cable {cable.name!r}", said, Status.COINCIDENT_SITES)
+            problem = f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
+            problem += "direction there. Move a site, or change the posture."
+            raise InvalidInput(f"cable {cable.name!r}", problem, Status.COINCIDENT_SITES)
 
     @cached_property
     def chains(self) -> Chains:

@@ -15,10 +15,10 @@ from cdsm.wires.elasticity import Elasticity, newton_in_bracket
 
 def group_by_law(cables: Iterable[tuple[int, Cable]]) -> dict[Elasticity, list[int]]:
     """Return the indices of numbered cables by their law, in their order."""
-    found: dict[Elasticity, list[int]] = {}
+    groups: dict[Elasticity, list[int]] = {}
     for c, cable in cables:
-        found.setdefault(cable.elasticity, []).append(c)
-    return found
+        groups.setdefault(cable.elasticity, []).append(c)
+    return groups
 
 
 class CableLaws:
@@ -46,23 +46,23 @@ class CableLaws:
     def __init__(self, cables: tuple[Cable, ...], *, whole: bool = True) -> None:
         self._cables = cables
         self._whole = whole
-        locked = [(c, each) for c, each in enumerate(cables) if each.control == "position"]
+        locked = [(c, cable) for c, cable in enumerate(cables) if cable.control == "position"]
         # usually all cables have one law, and a slice is faster than indices
         self.held = [
-            (law, slice(None) if len(of) == len(cables) else np.array(of))
-            for law, of in group_by_law(locked).items()
+            (law, slice(None) if len(group) == len(cables) else np.array(group))
+            for law, group in group_by_law(locked).items()
         ]
         self._least = frozen(np.array([cable.minimum for cable in cables]))
         self._most = frozen(np.array([cable.maximum for cable in cables]))
         self.series = frozen(1.0 / np.array([cable.series_stiffness for cable in cables]))
         self.rest = frozen(np.array([cable.elasticity.rest for cable in cables]))
-        self.nonlinear = [(law, of) for law, of in self.held if law.constant_rigidity is None]
+        self.nonlinear = [(law, group) for law, group in self.held if law.constant_rigidity is None]
         constant = np.zeros(len(cables))
         linear = np.zeros(len(cables))
-        for law, of in self.held:
+        for law, group in self.held:
             if law.constant_rigidity is not None:
-                constant[of] = law.constant_rigidity
-                linear[of] = 1.0
+                constant[group] = law.constant_rigidity
+                linear[group] = 1.0
         self.constant = frozen(constant)
         self.linear = frozen(linear)
 
@@ -75,8 +75,8 @@ class CableLaws:
         rigidities = self.rigidities(tension)
         k = self.stiffness_of(lengths, tension, rigidities)
         if k.min() < 0.0:
-            for law, of in self.nonlinear:
-                self._evaluate(law, of, tension[of])
+            for law, group in self.nonlinear:
+                self._evaluate(law, group, tension[group])
             self.require_wire(self.original_lengths(lengths, tension), tension)
         return frozen(k)
 
@@ -116,11 +116,11 @@ class CableLaws:
     def rigidities(self, tension: Array) -> Array:
         """Compute EA (1 + ε) (…, C) [N] at F (…, C): 0: force-controlled; −1: outside, or NaN."""
         rigidity = self.constant + self.linear * tension
-        for law, of in self.nonlinear:
-            F = tension[..., of]
+        for law, group in self.nonlinear:
+            F = tension[..., group]
             inside = (law.low <= F) & (law.high >= F)
-            stretch, EA = self._evaluate(law, of, np.where(inside, F, law.low))
-            rigidity[..., of] = np.where(inside, EA * stretch, -1.0)
+            stretch, EA = self._evaluate(law, group, np.where(inside, F, law.low))
+            rigidity[..., group] = np.where(inside, EA * stretch, -1.0)
         return frozen(rigidity)
 
     def original_lengths(self, lengths: Array, tension: Array) -> Array:
@@ -130,9 +130,9 @@ class CableLaws:
         force-controlled cable has no l_0: its entry is L.
         """
         wire = np.array(lengths)
-        for law, of in self.held:
-            wire[of] -= self.series[of] * (tension[of] - self.rest[of])
-            wire[of] /= self._evaluate(law, of, tension[of])[0]
+        for law, group in self.held:
+            wire[group] -= self.series[group] * (tension[group] - self.rest[group])
+            wire[group] /= self._evaluate(law, group, tension[group])[0]
         return frozen(wire)
 
     def stretched(self, tension: Array, free_length: Array, longer: Array) -> tuple[Array, Array]:
@@ -144,9 +144,11 @@ class CableLaws:
         """
         F = np.array(tension)
         energy = tension * longer
-        for law, of in self.held:
-            start = law.require_inside(tension[of])
-            F[of], energy[of] = _stretch(law, start, free_length[of], self.series[of], longer[of])
+        for law, group in self.held:
+            start = law.require_inside(tension[group])
+            F[group], energy[group] = _stretch(
+                law, start, free_length[group], self.series[group], longer[group]
+            )
         return F, energy
 
     def stiffness_slope(self, tension: Array, stiffness: Array) -> Array:
@@ -158,28 +160,28 @@ class CableLaws:
             dk/dF = k (s/R + (1 − s) R′/R),      R′ = EA′ (1 + ε) + 1.
         """
         slope = np.zeros_like(stiffness)
-        for law, of in self.held:
-            stretch, EA = self._evaluate(law, of, tension[of])
-            share = stiffness[of] * self.series[of]
-            rise = law.slope_at(tension[of], EA) * stretch + 1.0
-            slope[of] = stiffness[of] * (share + (1.0 - share) * rise) / (EA * stretch)
+        for law, group in self.held:
+            stretch, EA = self._evaluate(law, group, tension[group])
+            share = stiffness[group] * self.series[group]
+            rise = law.slope_at(tension[group], EA) * stretch + 1.0
+            slope[group] = stiffness[group] * (share + (1.0 - share) * rise) / (EA * stretch)
         return frozen(slope)
 
     def _evaluate(
-        self, law: Elasticity, of: slice | NDArray[np.intp], tension: Array
+        self, law: Elasticity, group: slice | NDArray[np.intp], tension: Array
     ) -> tuple[Array, Array]:
-        """Compute 1 + ε and EA [N] of the cables ``of``."""
+        """Compute 1 + ε and EA [N] of the cables ``group``."""
         try:
             strain, EA = law.evaluate(law.require_inside(tension))
         except ElasticityRangeError as error:
-            raise self.naming(error, of) from None
+            raise self.naming(error, group) from None
         return 1.0 + strain, EA
 
     def naming(
-        self, error: ElasticityRangeError, of: slice | NDArray[np.intp]
+        self, error: ElasticityRangeError, group: slice | NDArray[np.intp]
     ) -> ElasticityRangeError:
-        """Return a copy of a law's error at the cables ``of`` that also names the cables."""
-        outside = np.arange(len(self._cables))[of][list(error.indices)].tolist()
+        """Return a copy of a law's error at the cables ``group`` that also names the cables."""
+        outside = np.arange(len(self._cables))[group][list(error.indices)].tolist()
         names = [self._cables[c].name for c in outside]
         return ElasticityRangeError(error.problem, error.tension, outside, names)
 

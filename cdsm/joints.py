@@ -47,14 +47,14 @@ class Coupling(NamedTuple):
 
 def mimics_of(robot: etree._Element) -> dict[str, Mimic]:
     """Return what each joint of a URDF mimics, if it does."""
-    found = {}
+    mimics = {}
     for joint in robot.iterfind("joint"):
         if (mimic := joint.find("mimic")) is not None:
             factor = mimic.get("multiplier") or 1.0
             offset = mimic.get("offset") or 0.0
-            said = Mimic(str(mimic.get("joint")), float(factor), float(offset))
-            found[str(joint.get("name"))] = said
-    return found
+            follower = Mimic(str(mimic.get("joint")), float(factor), float(offset))
+            mimics[str(joint.get("name"))] = follower
+    return mimics
 
 
 def coupling_of(
@@ -77,8 +77,8 @@ def coupling_of(
             if mimic.leader in way:
                 raise GeometryError(f"joints mimic each other in a circle: {' → '.join(way)}.")
             if mimic.leader not in names:
-                said = f"joint {way[-1]}: mimics {mimic.leader!r}, which is no joint that moves."
-                raise GeometryError(said)
+                problem = f"joint {way[-1]}: mimics {mimic.leader!r}, which is no joint that moves."
+                raise GeometryError(problem)
             way.append(mimic.leader)
         S[i, leaders.index(way[-1])] = factor
     return Coupling(frozen(S), frozen(offset), tuple(names.index(name) for name in leaders))
@@ -152,26 +152,26 @@ class Springs:
         S = self._coupling.matrix
         root = np.sqrt(self.stiffness)
         free = root * (self.angle - self._coupling.offset)
-        found = np.linalg.lstsq(S * root[:, None], free, rcond=None)[0]
-        return frozen(np.asarray(found, dtype=np.float64))
+        angles = np.linalg.lstsq(S * root[:, None], free, rcond=None)[0]
+        return frozen(np.asarray(angles, dtype=np.float64))
 
 
-def springs_of(given: object, joints: tuple[str, ...], coupling: Coupling | None) -> Springs:
+def springs_of(springs: object, joints: tuple[str, ...], coupling: Coupling | None) -> Springs:
     """Check springs by the name of their joint, and return those of all ``joints``.
 
     Raises InvalidInput, also if there is no such joint.
     """
-    if not isinstance(given, Mapping):
-        said = f"{given!r} given; give a dict of joint names and stiffnesses [N m/rad]."
-        raise InvalidInput("springs", said)
+    if not isinstance(springs, Mapping):
+        problem = f"{springs!r} given; give a dict of joint names and stiffnesses [N m/rad]."
+        raise InvalidInput("springs", problem)
     k = np.zeros(len(joints))
     angle = np.zeros(len(joints))
-    for name, spring in given.items():
+    for name, spring in springs.items():
         j = joints.index(one_of("joint", name, joints))
         pair = list(spring) if isinstance(spring, Sequence) else [spring, 0.0]
         if len(pair) != 2:
             raise InvalidInput(f"springs[{name!r}]", "give a stiffness, or (stiffness, angle).")
-        k[j], angle[j] = (scalar(f"springs[{name!r}]", each) for each in pair)
+        k[j], angle[j] = (scalar(f"springs[{name!r}]", number) for number in pair)
         if fault := within("spring", k[j], zero=True):
             raise InvalidInput(f"springs[{name!r}]", f"{fault}.")
     return Springs(joints, frozen(k), frozen(angle), coupling)

@@ -82,18 +82,18 @@ class Manipulator(ComputedArm):
         gravity: Direction = GRAVITY,
     ) -> None:
         if isinstance(geometry, str | os.PathLike):
-            said = f"{str(geometry)!r} given; a Geometry is needed. "
-            said += "Read the file of a robot with Manipulator.from_urdf()."
-            raise InvalidInput("geometry", said)
+            problem = f"{str(geometry)!r} given; a Geometry is needed. "
+            problem += "Read the file of a robot with Manipulator.from_urdf()."
+            raise InvalidInput("geometry", problem)
         described = instance("geometry", geometry, Geometry)
         if (elasticity is None) == (cables is None):
-            said = "give one of elasticity= (for the cables of the geometry) and cables=; "
-            said += f"{'neither was' if cables is None else 'both were given'}."
-            raise InvalidInput("elasticity", said)
+            problem = "give one of elasticity= (for the cables of the geometry) and cables=; "
+            problem += f"{'neither was' if cables is None else 'both were given'}."
+            raise InvalidInput("elasticity", problem)
         routed = _read(cables) if elasticity is None else serpentine_cables(described, elasticity)
         urdf = to_urdf(described)
         defined: Any = {"cables": routed, "gravity": gravity, "geometry": described}
-        self._compute(ArmDefinition(urdf=urdf, tip_link=TIP, **defined))
+        self.compute(ArmDefinition(urdf=urdf, tip_link=TIP, **defined))
 
     @classmethod
     def from_urdf(
@@ -209,7 +209,7 @@ class Manipulator(ComputedArm):
         state = self.body.state(q)
         site = routing.sites(state.placement)
         spans = routing.spans(state.twist, site)
-        self._require_apart(spans.length, q)
+        self.require_apart(spans.length, q)
         return Posture(
             arm=self,
             q=q,

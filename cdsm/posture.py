@@ -109,15 +109,15 @@ class Posture(ReadOnlyState):
     @property
     def bones(self) -> tuple[Array, ...]:
         """The links as a stick figure: lines (2, 3) [m] from joint to joint and to the tip."""
-        return tuple(bone for _, bone in self._bones)
+        return tuple(bone for _, bone in self.bones_by_row)
 
     @property
     def brackets(self) -> tuple[Array, ...]:
         """Lines (2, 3) [m] from each cable site to the nearest of the bones of the site's link."""
-        return tuple(self._stick_figure()[1])
+        return tuple(self.stick_figure()[1])
 
     @cached_property
-    def _bones(self) -> list[tuple[int, Array]]:
+    def bones_by_row(self) -> list[tuple[int, Array]]:
         """The bones, each with the row of the joint that carries its link; row 0 is the base."""
         origin = self.placements[:, :3, 3]
         body = self.arm.body
@@ -126,16 +126,16 @@ class Posture(ReadOnlyState):
         bones = [(row, np.array([origin[row], end])) for row, end in ends]
         return [(row, frozen(bone)) for row, bone in bones if (bone[0] != bone[1]).any()]
 
-    def _stick_figure(self, without: Collection[int] = ()) -> tuple[list[Array], list[Array]]:
+    def stick_figure(self, without: Collection[int] = ()) -> tuple[list[Array], list[Array]]:
         """Return :attr:`bones` and :attr:`brackets`, except those of the rows in ``without``."""
         brackets = []
         for row, site in zip(self.arm.routing.row.tolist(), self.sites.T, strict=True):
             if row not in without:
-                feet = [foot(site, bone) for at, bone in self._bones if at == row]
+                feet = [foot(site, bone) for at, bone in self.bones_by_row if at == row]
                 ends = feet or [self.placements[row, :3, 3]]
                 nearest = min(ends, key=lambda end: float(np.linalg.norm(end - site)))
                 brackets.append(frozen(np.array([site, nearest])))
-        return [bone for row, bone in self._bones if row not in without], brackets
+        return [bone for row, bone in self.bones_by_row if row not in without], brackets
 
     def link_pose(self, link: str) -> Array:
         """Compute the pose (4, 4) [m] of a link's frame in base axes, or raise InvalidInput."""
@@ -193,9 +193,9 @@ class MomentArms(Result):
         """Return the moment arm of a cable about a joint."""
         cables = self.posture.arm.cables.names
         joints = self.posture.arm.joint_names
-        said = f'give a cable and a joint, such as moment_arms["{cables[0]}", "{joints[0]}"].'
+        remedy = f'give a cable and a joint, such as moment_arms["{cables[0]}", "{joints[0]}"].'
         if not isinstance(names, tuple) or len(names) != 2:
-            raise InvalidInput("moment_arms", f"{names!r} given; {said}")
+            raise InvalidInput("moment_arms", f"{names!r} given; {remedy}")
         row = cables.index(one_of("cable", names[0], cables))
         return float(self.values[row, joints.index(one_of("joint", names[1], joints))])
 

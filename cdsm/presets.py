@@ -106,10 +106,10 @@ def experimental_prototype_geometry(
             (0.3 m) or ``friction`` (0; the paper has none).
     """
     assumed = {"link_length": 0.1, "base_length": 0.05, "disk_offset": 0.02, "hole_radius": 0.03}
-    given: dict[str, Any] = assumed | {"lead": 0.3, "joint_limit": np.deg2rad(30.0)} | sizes
+    dimensions: dict[str, Any] = assumed | {"lead": 0.3, "joint_limit": np.deg2rad(30.0)} | sizes
     name = "experimental_prototype"
     twist = np.deg2rad(30.0)
-    geometry = Geometry.hinged(name=name, joints=3, twist=twist, link_mass=link_mass, **given)
+    geometry = Geometry.hinged(name=name, joints=3, twist=twist, link_mass=link_mass, **dimensions)
     if tool_length is None:
         return geometry
     last = Link(length=tool_length, mass=link_mass)

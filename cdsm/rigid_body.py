@@ -129,7 +129,7 @@ class RigidBody:
             torque = torque @ S
             slope = self.coupling.square(slope)
         tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
-        placement = np.array([each.homogeneous for each in data.oMi])
+        placement = np.array([frame.homogeneous for frame in data.oMi])
         return State(tip, J, torque, slope, twist, placement)
 
     def tip(self, q: Array) -> tuple[Array, Array]:

@@ -97,8 +97,8 @@ class Routing:
                 if row[-2] == row[-1]:
                     length = math.dist(point[-2], point[-1])
                     if length < SHORTEST_SEGMENT:
-                        said = f"sites {i} and {i + 1} coincide; leave one out."
-                        raise InvalidInput(f"cable {cable.name!r}", said)
+                        problem = f"sites {i} and {i + 1} coincide; leave one out."
+                        raise InvalidInput(f"cable {cable.name!r}", problem)
                     if not every:
                         fixed[c] += length
                         continue

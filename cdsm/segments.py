@@ -167,9 +167,9 @@ class Segments(ReadOnlyState):
 
         The entry is 1 for the last segment of a cable, which has no hole after it.
         """
-        found = np.ones(self.lengths.size)
-        found[self.chains.hole] = np.exp(self.grip)
-        return found
+        ratios = np.ones(self.lengths.size)
+        ratios[self.chains.hole] = np.exp(self.grip)
+        return ratios
 
     def tension_stiffness(self, tension: Array) -> Array:
         """Compute Σ T_j ∂²l_j/∂θ² [N m/rad] over the segments j of each cable, (C, nv, nv).

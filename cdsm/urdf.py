@@ -178,16 +178,16 @@ def _cylinder(material: str, x: float, radius: float, length: float) -> etree._E
     return E.visual(shape, place, E.material(name=material))
 
 
-def _revolute(of: Axis) -> etree._Element:
-    axis = of.axis
-    length = math.hypot(*of.axis)
+def _revolute(hinge: Axis) -> etree._Element:
+    axis = hinge.axis
+    length = math.hypot(*hinge.axis)
     if abs(length - 1.0) >= 1e-15:  # a unit vector keeps its digits
         axis = tuple(a / length for a in axis)
-    ends = E.limit(effort=1000.0, velocity=10.0, lower=-of.limit, upper=of.limit)
-    parts = [*_at(of.x), E.axis(xyz=axis), ends]
-    if of.leader:
-        parts.append(E.mimic(joint=of.leader, multiplier=1.0, offset=0.0))
-    return joint("revolute", of.name, of.parent, of.child, *parts)
+    ends = E.limit(effort=1000.0, velocity=10.0, lower=-hinge.limit, upper=hinge.limit)
+    parts = [*_at(hinge.x), E.axis(xyz=axis), ends]
+    if hinge.leader:
+        parts.append(E.mimic(joint=hinge.leader, multiplier=1.0, offset=0.0))
+    return joint("revolute", hinge.name, hinge.parent, hinge.child, *parts)
 
 
 def _at(x: float) -> tuple[etree._Element, ...]:

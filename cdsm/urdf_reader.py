@@ -58,7 +58,7 @@ def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> 
     except XmlFault as error:
         mjcf = " It is a MuJoCo model (MJCF): give the URDF that it was made from."
         raise GeometryError(f"{name}: {error}.{mjcf if '<mujoco>' in str(error) else ''}") from None
-    if any("xacro" in (etree.QName(each).namespace or "") for each in robot.iter("*")):
+    if any("xacro" in (etree.QName(element).namespace or "") for element in robot.iter("*")):
         raise GeometryError(
             f"{name} is a xacro file; run xacro on it first, and give what it prints."
         )
@@ -81,14 +81,14 @@ def _text_faults(parts: list[etree._Element]) -> Iterator[str]:
             yield f"{tag} {name}: the name is used twice" if name else f"a <{tag}> has no name"
     for part in parts:
         tags = Counter(child.tag for child in part)
-        found = [f"has {tags[tag]} <{tag}>; one is needed" for tag in _MODEL if tags[tag] > 1]
+        part_faults = [f"has {tags[tag]} <{tag}>; one is needed" for tag in _MODEL if tags[tag] > 1]
         for holder in (part, *part.findall("inertial")):
             needed = _INSIDE.get(holder.tag, ())
-            found += [f"has no <{tag}>" for tag in needed if holder.find(tag) is None]
+            part_faults += [f"has no <{tag}>" for tag in needed if holder.find(tag) is None]
         for child in part:
             faults = [fault for element in child.iter("*") for fault in _number_faults(element)]
-            found += faults if child.tag in _MODEL else []
-        yield from (f"{part.tag} {part.get('name')}: {fault}" for fault in found)
+            part_faults += faults if child.tag in _MODEL else []
+        yield from (f"{part.tag} {part.get('name')}: {fault}" for fault in part_faults)
 
 
 def _number_faults(element: etree._Element) -> Iterator[str]:
@@ -122,8 +122,8 @@ def _link_faults(links: list[etree._Element], check_inertia: bool) -> Iterator[s
     for link, (name, mass) in zip(links, _masses(links).items(), strict=True):
         if not 0.0 <= mass <= RANGES["mass"].high:
             yield f"link {name}: mass {mass:g} kg; 0 to 1e6 kg is needed"
-        own = link.find("inertial/inertia")
-        inertia = [[_number(own, "i" + min(a + b, b + a)) for b in "xyz"] for a in "xyz"]
+        inertial = link.find("inertial/inertia")
+        inertia = [[_number(inertial, "i" + min(a + b, b + a)) for b in "xyz"] for a in "xyz"]
         least, mid, most = np.linalg.eigvalsh(inertia).tolist()
         if check_inertia and least + mid - most < -_LOOSE * max(most, -least):
             yield (
@@ -179,12 +179,16 @@ def _tree_faults(links: list[str], joints: list[etree._Element]) -> list[str]:
         faults += [f"joint {name}: joins link {ends[1]} to itself"] * (ends[0] == ends[1])
         carriers[ends[1]].append((name, ends[0]))
     for link, by in carriers.items():
-        said = f"link {link}: has two parents, by the joints {' and '.join(name for name, _ in by)}"
-        faults += [said] * (len(by) > 1)
+        problem = (
+            f"link {link}: has two parents, by the joints {' and '.join(name for name, _ in by)}"
+        )
+        faults += [problem] * (len(by) > 1)
     roots = [link for link in links if link not in carriers]
     if faults or len(roots) != 1:
-        said = f"has the roots {listed(roots) or 'none'}; one link that no joint carries is needed"
-        return faults or [said]
+        problem = (
+            f"has the roots {listed(roots) or 'none'}; one link that no joint carries is needed"
+        )
+        return faults or [problem]
     depths = {roots[0]: 0}
     while level := [x for x in links if x not in depths and carriers[x][0][1] in depths]:
         depths |= {link: 1 + depths[carriers[link][0][1]] for link in level}

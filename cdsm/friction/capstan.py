@@ -13,7 +13,7 @@ from cdsm.cable_laws import group_by_law
 from cdsm.posture import Posture
 from cdsm.routing import Indices
 from cdsm.segments import STRAIGHT
-from cdsm.stiffness_matrix import Friction, Stiffness, assemble
+from cdsm.stiffness_matrix import FrictionState, Stiffness, assemble
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 from cdsm.terms import total
@@ -67,8 +67,8 @@ class ChainProblem:
         self._softness = np.zeros(size)
         self._curved: list[tuple[Elasticity, Indices]] = []
         self.laws = list(group_by_law(enumerate(cables)).items())
-        for law, of in self.laws:
-            segments = np.flatnonzero(np.isin(self._cable, of))
+        for law, group in self.laws:
+            segments = np.flatnonzero(np.isin(self._cable, group))
             if law.constant_rigidity is None:
                 self._curved.append((law, segments))
             else:
@@ -83,13 +83,13 @@ class ChainProblem:
         ``ratio`` (S,) is exp(μ φ) of the hole to the next segment. ``forced`` (C,) [N] is the
         tension of force-controlled motors, NaN for others. The search starts at ``near`` (S,) [N].
         """
-        from cdsm.friction.capstan_kernels import Wire, solve_chains  # imports numba
+        from cdsm.friction.capstan_kernels import SegmentArrays, solve_chains  # imports numba
 
         T = near
         for step in range(_STEPS):
             base, softness = self._strain(T)
             parts = length, rest_length, base, softness, self._spring, self._unloaded, ratio
-            new, slip, slides = solve_chains(self._start, forced, Wire(*parts), T)
+            new, slip, slides = solve_chains(self._start, forced, SegmentArrays(*parts), T)
             if not self._curved or (abs(new - T) <= _CONVERGED * np.maximum(new, 1.0)).all():
                 break
             T = new if step < _UNDAMPED else self._shortened(T, new, length, rest_length)
@@ -120,10 +120,10 @@ class ChainProblem:
         """
         base, softness = self._strain(tension)
         energy = self._softness * tension**2 / 2.0
-        for law, of in self._curved:
-            T = tension[of]
-            inside = np.clip(tension[of], law.low, law.high)
-            energy[of] = law.energy(inside) + softness[of] * (T**2 - inside**2) / 2.0
+        for law, group in self._curved:
+            T = tension[group]
+            inside = np.clip(tension[group], law.low, law.high)
+            energy[group] = law.energy(inside) + softness[group] * (T**2 - inside**2) / 2.0
         return np.asarray(tension * (base + softness * tension) - energy)
 
     def _shortened(self, T: Array, new: Array, length: Array, rest_length: Array) -> Array:
@@ -145,11 +145,11 @@ class ChainProblem:
             return self._base, self._softness
         base = self._base.copy()
         softness = self._softness.copy()
-        for law, of in self._curved:
-            inside = np.clip(tension[of], law.low, law.high)
+        for law, group in self._curved:
+            inside = np.clip(tension[group], law.low, law.high)
             strain, rigidity = law.evaluate(inside)
-            softness[of] = 1.0 / rigidity
-            base[of] += strain - inside / rigidity
+            softness[group] = 1.0 / rigidity
+            base[group] += strain - inside / rigidity
         return base, softness
 
 
@@ -198,7 +198,7 @@ def assemble_segments(
     tension: Array,
     sliding: Flags,
     wrench: Array,
-    friction: Friction,
+    friction: FrictionState,
     distribution: Tension | None = None,
 ) -> Stiffness:
     """Compute the stiffness from checked tensions T (S,) [N] of the segments.

@@ -57,9 +57,9 @@ class Breakaway(Result):
     link: str = field(metadata=unit("1"))
 
     def __str__(self) -> str:
-        said = f"breakaway along {coordinates(self.direction)}: {self.load:.4g} N"
+        text = f"breakaway along {coordinates(self.direction)}: {self.load:.4g} N"
         where = f", first at site {self.site} of {self.cable} ({self.link})"
-        return said + where * bool(self.cable)
+        return text + where * bool(self.cable)
 
 
 def stuck_stiffness(
@@ -78,8 +78,8 @@ def stuck_stiffness(
     """
     F, W = checked_tension(pose, tension, wrench)
     none = np.zeros(pose.segments.wrap.size, dtype=np.bool_)
-    given = tension if isinstance(tension, Tension) else None
-    return assemble_segments(pose, F[pose.segments.chains.cable], none, W, "stuck", given)
+    distribution = tension if isinstance(tension, Tension) else None
+    return assemble_segments(pose, F[pose.segments.chains.cable], none, W, "stuck", distribution)
 
 
 def breakaway(
@@ -222,13 +222,13 @@ class RestBand(Result):
 
     def __str__(self) -> str:
         rough = self.stiffness.posture.segments.chains.friction.max(initial=0.0) > 0.1
-        said = (
+        band = (
             f"first-order band: the tip rests within ±{1e3 * self.half_width:.4g} mm along "
             f"{coordinates(self.direction)} of this posture, whatever loads came before; "
             f"breakaway load {self.breakaway:.4g} N\n(few loads pass it, by "
             f"{'about 10' if rough else 'less than 2'} %; near buckling it is far too wide)"
         )
-        return "\n".join([*self.warnings, said])
+        return "\n".join([*self.warnings, band])
 
 
 def rest_band(

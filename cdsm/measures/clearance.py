@@ -123,7 +123,7 @@ def distances(
         radii = {
             arm.body.locate(body.name)[0]: backbone_radius(arm.geometry, body) for body in bodies
         }
-        rows = [row for row, _ in pose._bones]
+        rows = [row for row, _ in pose.bones_by_row]
         links = ["the base", *(f"the link after {name}" for name in arm.body.all_joints)]
         radius = np.array([radii.get(row, 0.0) for row in rows])
         lines = np.array(pose.bones).reshape(-1, 2, 3)

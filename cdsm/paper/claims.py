@@ -31,7 +31,7 @@ EXPLANATION = (
 
 _HOLDS = 0.2  # largest difference with which a number of the paper holds, as a part of it
 
-Said: TypeAlias = tuple[str, str, str, tuple[float, ...] | None]
+Statement: TypeAlias = tuple[str, str, str, tuple[float, ...] | None]
 """What the paper says: the first four fields of a :class:`Claim`."""
 
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from cdsm import presets
 from cdsm.manipulator import Manipulator
-from cdsm.paper.claims import Claim, Figure, Said, floats
+from cdsm.paper.claims import Claim, Figure, Statement, floats
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import XYZ
@@ -127,9 +127,9 @@ def measured(arm: Manipulator, q: ArrayLike, tensions: Sequence[float] | Array) 
     return np.array(rows)
 
 
-def _claim(said: Said, computed: Sequence[float] | Array, assumption: str) -> Claim:
+def _claim(statement: Statement, computed: Sequence[float] | Array, assumption: str) -> Claim:
     searched = "dimensions of the prototype, conditions of the tests"
-    return Claim(*said, floats(computed), assumption=assumption, searched=searched)
+    return Claim(*statement, floats(computed), assumption=assumption, searched=searched)
 
 
 def figure_10() -> ExperimentFigure:
@@ -146,13 +146,13 @@ def figure_10() -> ExperimentFigure:
     claims = []
     traces = []
     for axis, paper, ours, curve in zip(XYZ, TABLE_II_SWAPPED.T, computed.T, curves.T, strict=True):
-        said = "Table II", f"stiffness in {axis}", "N/mm", floats(paper / 1e3)
-        claims.append(_claim(said, ours / 1e3, f"tensions evenly spaced; {exchanged}"))
+        statement = "Table II", f"stiffness in {axis}", "N/mm", floats(paper / 1e3)
+        claims.append(_claim(statement, ours / 1e3, f"tensions evenly spaced; {exchanged}"))
         beside = {"paper_at": TENSIONS, "paper": frozen(paper.copy())}
         traces.append(Trace(label=axis, swept=tensions, computed=frozen(curve.copy()), **beside))
     rise, paper = (floats(table[-1] / table[0] - 1.0) for table in (computed, TABLE_II))
-    said = "Fig. 10", "increment of stiffness, (last − first)/first", "times", paper
-    claims.append(_claim(said, rise, "tensions from 3 to 86 N"))
+    statement = "Fig. 10", "increment of stiffness, (last − first)/first", "times", paper
+    claims.append(_claim(statement, rise, "tensions from 3 to 86 N"))
     for label, table in ((exchanged, TABLE_II_SWAPPED), ("as printed", TABLE_II)):
         misfit = 100.0 * np.sqrt(np.mean(np.log(computed / table) ** 2, axis=0))
         assumed = f"root mean square of ln(model/paper); {label}"
@@ -180,11 +180,11 @@ def figure_12() -> ExperimentFigure:
     traces = _relative(tensions, [first, second], 1.0 - np.array(DROPS))
     falls = [100.0 * (1.0 - trace.computed[-1]) for trace in traces]
     paper = floats(100.0 * drop for drop in DROPS)
-    said = "Fig. 12", "largest reduction of stiffness in y, two configurations", "%", paper
+    statement = "Fig. 12", "largest reduction of stiffness in y, two configurations", "%", paper
     assumed = (
         f"tension 3 to {HIGHEST_TENSION:g} N; the first configuration is the posture of Table II"
     )
-    drops = _claim(said, falls, assumed)
+    drops = _claim(statement, falls, assumed)
     stated = "calculated stiffness in z of the accuracy check", "N/mm", (CHECK / 1e3,)
     assumed = f"posture of Table II, cables of 1.89 N/mm, {HYBRID_TENSION:g} N; "
     assumed += f"the paper measured {MEASURED / 1e3:g} N/mm"
@@ -208,7 +208,7 @@ def figure_13() -> ExperimentFigure:
         for q in (POSTURE, SECOND_POSTURE)
     ]
     traces = _relative(springs, curves, 1.0 + np.array(RISES))
-    said = "Fig. 13", "increment of stiffness in y, two configurations", "times", RISES
+    statement = "Fig. 13", "increment of stiffness in y, two configurations", "times", RISES
     assumed = f"stiffest spring {STIFFEST / HYBRID:.3g} times the softest; {HYBRID_TENSION:g} N"
     return ExperimentFigure(
         name="fig13",
@@ -216,7 +216,7 @@ def figure_13() -> ExperimentFigure:
         swept="cable_stiffness",
         relative=True,
         traces=traces,
-        claims=(_claim(said, [trace.computed[-1] - 1.0 for trace in traces], assumed),),
+        claims=(_claim(statement, [trace.computed[-1] - 1.0 for trace in traces], assumed),),
     )
 
 

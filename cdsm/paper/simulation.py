@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from cdsm import presets
-from cdsm.paper.claims import Claim, Figure, Said, floats
+from cdsm.paper.claims import Claim, Figure, Statement, floats
 from cdsm.paper.strand import LEVEL, law_of_stretched_length
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
@@ -134,25 +134,29 @@ def _curves(
         wires = map(law_of_stretched_length, laws) if length == "stretched" else laws
         arms = [presets.virtual_prototype(wire, lead=lead) for wire in wires]
         cases = [(arm.at(q), float(F)) for arm, F in product(arms, minima)]
-        found = [stiffness(pose, distribute_tension(pose, F)) for pose, F in cases]
+        stiffnesses = [stiffness(pose, distribute_tension(pose, F)) for pose, F in cases]
         axes = np.eye(3)
         return Curve(
             label=label,
             original_length=length,
             q=frozen(q.copy()),
             swept=_rows(minima if swept is None else swept),
-            tension=_rows((K.tension.min(), K.tension.mean(), K.tension.max()) for K in found),
-            pseudoinverse=_rows(np.diag(K.pseudoinverse()) for K in found),
-            pseudoinverse_part=_rows(np.diag(K.pseudoinverse(part)) for K in found),
-            along=_rows([K.along(axis) for axis in axes] for K in found),
-            along_part=_rows([getattr(K.shares(axis), part).sum() for axis in axes] for K in found),
+            tension=_rows(
+                (K.tension.min(), K.tension.mean(), K.tension.max()) for K in stiffnesses
+            ),
+            pseudoinverse=_rows(np.diag(K.pseudoinverse()) for K in stiffnesses),
+            pseudoinverse_part=_rows(np.diag(K.pseudoinverse(part)) for K in stiffnesses),
+            along=_rows([K.along(axis) for axis in axes] for K in stiffnesses),
+            along_part=_rows(
+                [getattr(K.shares(axis), part).sum() for axis in axes] for K in stiffnesses
+            ),
         )
 
     return curve("stretched"), curve("unstrained")
 
 
 def _claim(
-    said: Said,
+    statement: Statement,
     pair: tuple[Curve, Curve],
     measure: Callable[[Array, Array], Array],
     assumption: str,
@@ -166,7 +170,7 @@ def _claim(
         floats(measure(original.pseudoinverse, original.pseudoinverse_part)),
         floats(measure(original.along, original.along_part)),
     )
-    return Claim(*said, *numbers, assumption=assumption, searched=searched, at_most=at_most)
+    return Claim(*statement, *numbers, assumption=assumption, searched=searched, at_most=at_most)
 
 
 def _figure(
@@ -174,8 +178,8 @@ def _figure(
 ) -> StiffnessFigure:
     curves, original = zip(*pairs, strict=True)
     postures = tuple(presets.virtual_prototype().at(curve.q) for curve in curves)
-    own: Any = {"name": f"fig{number}", "title": f"Fig. {number}: {about}", "claims": claims}
-    return StiffnessFigure(**own, curves=curves, original=original, postures=postures, **options)
+    names: Any = {"name": f"fig{number}", "title": f"Fig. {number}: {about}", "claims": claims}
+    return StiffnessFigure(**names, curves=curves, original=original, postures=postures, **options)
 
 
 def figure_3() -> StiffnessFigure:
@@ -191,7 +195,7 @@ def figure_3() -> StiffnessFigure:
     ]
     for pair, F in zip(pairs, labels, strict=True):
         what = f"largest difference of passive and total stiffness, lower bound {F:g} N"
-        gap: Said = "Fig. 3", what, "%", (1.5,)
+        gap: Statement = "Fig. 3", what, "%", (1.5,)
         claims.append(_claim(gap, pair, _largest_gap, f"{wire} {F:g} N", at_most=True))
     about = "stiffness over Young's modulus, cable tension constant"
     return _figure(3, about, pairs, *claims, swept="young_modulus", part="passive")
@@ -207,8 +211,8 @@ def figure_4() -> StiffnessFigure:
     for pair, searched in zip(pairs, ("EA, range of tension", "range of tension"), strict=True):
         assumed = f"{pair[0].label}, lower bound 100 to 800 N"
         what = f"change of stiffness with tension, {pair[0].label.partition(' (')[0]}"
-        said: Said = "Fig. 4", what, "%", (-1.46, -1.04, -1.43)
-        claims.append(_claim(said, pair, _percent, assumed, f"{searched}; {_FROM_FIG_6}"))
+        statement: Statement = "Fig. 4", what, "%", (-1.46, -1.04, -1.43)
+        claims.append(_claim(statement, pair, _percent, assumed, f"{searched}; {_FROM_FIG_6}"))
     about = "stiffness over cable tension, cable elasticity constant"
     return _figure(4, about, pairs, *claims)
 
@@ -230,38 +234,38 @@ def figure_lead() -> LeadFigure:
 
     def first_falls(changes: Array) -> tuple[float, ...]:  # [mm] in x, y, z; 0 with any lead
         roots = (CubicSpline(LEADS, column).roots(extrapolate=False) for column in changes.T)
-        return floats(1e3 * found.min() if found.size else 0.0 for found in roots)
+        return floats(1e3 * zeros.min() if zeros.size else 0.0 for zeros in roots)
 
-    said = "Fig. 4, lead", "lead from which stiffness falls with tension", "mm", None
+    statement = "Fig. 4, lead", "lead from which stiffness falls with tension", "mm", None
     falls = first_falls(stretched[:, 0]), first_falls(original[:, 0]), first_falls(original[:, 1])
-    claim = Claim(*said, *falls, assumption="as Fig. 4, EA = 48 kN", searched=_FROM_FIG_6)
+    claim = Claim(*statement, *falls, assumption="as Fig. 4, EA = 48 kN", searched=_FROM_FIG_6)
     title = "Change of stiffness, 100 N to 800 N, over the lead of the cables, EA = 48 kN"
-    given = {"leads": LEADS, "stretched": stretched, "original": original}
-    return LeadFigure(name="lead", title=title, claims=(claim,), **given)
+    changes = {"leads": LEADS, "stretched": stretched, "original": original}
+    return LeadFigure(name="lead", title=title, claims=(claim,), **changes)
 
 
 def figure_6() -> StiffnessFigure:
     """Compute stiffness as a function of tension in the pre-tensioning stage, with Eq. 19."""
     pair = _curves("Eq. 19", [presets.STRAND_1X19], np.linspace(15.0, 120.0, _POINTS))
-    said = "Fig. 6", "increment of stiffness, (last − first)/first", "times", (4.24, 2.9, 4.57)
+    statement = "Fig. 6", "increment of stiffness, (last − first)/first", "times", (4.24, 2.9, 4.57)
     assumed = "three cables a joint, 0.5 kg a link, gravity along −y, no lead; Eq. 19 repaired, "
     assumed += "lower bound 15 to 120 N"
     searched = (
         "cables, link, mass, gravity, hole phase, lower bound and reading of K_R, for this row"
     )
     about = "stiffness over cable tension in the pre-tensioning stage, Eq. 19"
-    return _figure(6, about, [pair], _claim(said, pair, _increment, assumed, searched))
+    return _figure(6, about, [pair], _claim(statement, pair, _increment, assumed, searched))
 
 
 def figure_7() -> StiffnessFigure:
     """Compute stiffness as a function of tension in the elastic stage, with constant EA."""
     highest = _highest_minimum(_TEN)
     pair = _curves("EA = 48 kN", [presets.ELASTIC_STAGE], np.linspace(120.0, highest, _POINTS))
-    said = "Fig. 7", "change in the elastic stage", "%", (-1.5, -0.6, -1.6)
+    statement = "Fig. 7", "change in the elastic stage", "%", (-1.5, -0.6, -1.6)
     assumed = (
         f"EA = 48 kN, tensions from 120 N to {STRAND_END:g} N (lower bound to {highest:.0f} N)"
     )
-    claim = _claim(said, pair, _percent, assumed, f"EA, for Fig. 4; {_FROM_FIG_6}")
+    claim = _claim(statement, pair, _percent, assumed, f"EA, for Fig. 4; {_FROM_FIG_6}")
     about = "stiffness over cable tension in the elastic stage, EA constant"
     return _figure(7, about, [pair], claim)
 
@@ -279,8 +283,8 @@ def figure_8() -> StiffnessFigure:
         posture = label.partition(":")[0]
         risen = f"rise of stiffness over the whole range, (last − first)/first, {posture}"
         fallen = f"change at the end of the range (paper: a slight decrease), {posture}"
-        rise: Said = "Fig. 8", risen, "times", None
-        fall: Said = "Fig. 8", fallen, "%", None
+        rise: Statement = "Fig. 8", risen, "times", None
+        fall: Statement = "Fig. 8", fallen, "%", None
         assumed = f"{label}; Eq. 19 repaired, lower bound 5 to {highest:.0f} N"
         claims.append(_claim(rise, pairs[-1], _increment, assumed))
         assumed = f"{label}; Eq. 19 most level within its digits, lower bound "

@@ -122,7 +122,15 @@ def figure_5() -> StrandFigure:
         secant=frozen(law.secant_rigidity(tension)),
         printed=frozen(eq19_as_printed(tension)),
         claims=tuple(
-            Claim("Fig. 5", what, of, paper, floats(x), assumption=why, misprint=paper is not None)
-            for what, of, paper, x, why in claims
+            Claim(
+                "Fig. 5",
+                what,
+                unit_text,
+                paper,
+                floats(x),
+                assumption=why,
+                misprint=paper is not None,
+            )
+            for what, unit_text, paper, x, why in claims
         ),
     )

@@ -94,7 +94,7 @@ class TensionSpace:
         J = pose.length_jacobian
         for u in self.directions:
             K.require_mobile(u)
-        self._size = max(float(K._magnitudes.diagonal().min()), SMALLEST)
+        self._size = max(float(K.magnitudes.diagonal().min()), SMALLEST)
         constant = [matrix for name, matrix in K.terms.items() if name not in CABLE_TERMS]
         self.constant_stiffness = total(constant)
         torque = required_torque(pose, self.least.wrench)

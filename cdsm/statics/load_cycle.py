@@ -16,7 +16,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
 from cdsm.statics.quasi_static import Load, QuasiStaticArm
-from cdsm.stiffness_matrix import Friction, Stiffness, checked_tension
+from cdsm.stiffness_matrix import FrictionState, Stiffness, checked_tension
 from cdsm.support.format import without_rounding
 from cdsm.support.progress import show_progress
 from cdsm.support.result import Result, quantity, unit
@@ -130,7 +130,7 @@ class LoadHistory(Result, Plotted):
         sliding = self.sliding[k] != 0
         T = self.segment_tensions[k].copy()
         W = frozen(self.wrenches[k].copy())
-        friction: Friction = "sliding" if sliding.any() else "stuck"
+        friction: FrictionState = "sliding" if sliding.any() else "stuck"
         return assemble_segments(self.pose(k), T, sliding, W, friction)
 
     def __str__(self) -> str:

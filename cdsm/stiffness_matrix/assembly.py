@@ -46,8 +46,8 @@ def checked_tension(
         F = vector("tension", tension, len(arm.cables), "one tension [N] per cable", "tension")
         c = int(F.argmin())
         if F[c] < 0.0:
-            said = f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
-            raise InvalidInput("tension", said)
+            problem = f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
+            raise InvalidInput("tension", problem)
         return F, wrench_vector("wrench", NO_WRENCH if wrench is None else wrench)
     if not np.array_equal(tension.posture.q, pose.q):
         raise InvalidInput("tension", "is of another posture; distribute it at this one.")

@@ -94,8 +94,8 @@ def model_of(K: Stiffness) -> str:
     if K.friction == "frictionless":
         return model
     mu = K.posture.segments.chains.friction
-    said = span(mu, "{:g}".format) if mu.size else "0"
-    return model.replace("frictionless", f"cables {K.friction}, μ = {said}")
+    coefficients = span(mu, "{:g}".format) if mu.size else "0"
+    return model.replace("frictionless", f"cables {K.friction}, μ = {coefficients}")
 
 
 def frictionless_model(arm: Manipulator) -> str:

@@ -33,7 +33,7 @@ from cdsm.terms import CABLE_TERMS, required_torque
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Friction = Literal["frictionless", "stuck", "sliding"]
+FrictionState = Literal["frictionless", "stuck", "sliding"]
 Joints = slice | NDArray[np.intp]
 
 _ORTHOGONAL = 1e-9  # largest product of two unit directions that are orthogonal
@@ -76,7 +76,7 @@ class Stiffness(Result):
     cable_stiffness: Array = field(metadata=unit_of("cable_stiffness"))
     free_length: Array | None = None
     distribution: Tension | None = None
-    friction: Friction = "frictionless"
+    friction: FrictionState = "frictionless"
     segment_tension: Array | None = None
     tension_gradient: Array | None = None
 
@@ -198,7 +198,7 @@ class Stiffness(Result):
         return frozen(readings.pseudoinverse(matrix, self._tip_motions(None)))
 
     @property
-    def _magnitudes(self) -> Array:
+    def magnitudes(self) -> Array:
         """Sum of the magnitudes of the terms (nv, nv): the size of their rounding errors."""
         return np.asarray(sum(map(abs, self.terms.values())))
 
@@ -213,7 +213,7 @@ class Stiffness(Result):
             SingularStiffness: K_θ of these joints is singular; the error has their motion.
         """
         K = self.joint[joints][:, joints]
-        magnitudes = self._magnitudes[joints][:, joints]
+        magnitudes = self.magnitudes[joints][:, joints]
         inverse, singular = readings.invert(K, magnitudes)
         if singular:
             motion = np.zeros(len(self.joint))

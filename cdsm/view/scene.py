@@ -118,7 +118,7 @@ class Scene:
         self._force.visible = pushed and bool(force.any())
         self._label.visible = pose is not None and shown.status is not Status.OK
         shaped = frozenset() if self._shapes is None else self._shapes.rows
-        bones, brackets = ([], []) if pose is None else pose._stick_figure(shaped)
+        bones, brackets = ([], []) if pose is None else pose.stick_figure(shaped)
         before = shown.reference.bones if shown.reference and shown.rest else ()
         for node, lines in (
             (self._sticks, bones),

@@ -142,6 +142,7 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
                 remedies = map(str, find_remedies(K))  # takes tenths of a second
                 problem = "\n".join([*K.warnings, *remedies])
                 return Shown(**results, status=Status.UNSTABLE, problem=problem)
+            return Shown(**results, status=Status.OK, problem="\n".join(pose.remarks))
         locked = cdsm.stuck_stiffness if arm.has_friction else stiffness
         stable = locked(pose, tension).is_stable
         rest, results["sliding"] = _rest(pose, tension, force)
