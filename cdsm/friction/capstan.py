@@ -83,13 +83,13 @@ class ChainProblem:
         ``ratio`` (S,) is exp(μ φ) of the hole to the next segment. ``forced`` (C,) [N] is the
         tension of force-controlled motors, NaN for others. The search starts at ``near`` (S,) [N].
         """
-        from cdsm.friction.capstan_kernels import SegmentArrays, solve_chains  # imports numba
+        from cdsm.friction.capstan_kernels import Wire, solve_chains  # imports numba
 
         T = near
         for step in range(_STEPS):
             base, softness = self._strain(T)
             parts = length, rest_length, base, softness, self._spring, self._unloaded, ratio
-            new, slip, slides = solve_chains(self._start, forced, SegmentArrays(*parts), T)
+            new, slip, slides = solve_chains(self._start, forced, Wire(*parts), T)
             if not self._curved or (abs(new - T) <= _CONVERGED * np.maximum(new, 1.0)).all():
                 break
             T = new if step < _UNDAMPED else self._shortened(T, new, length, rest_length)

@@ -51,7 +51,7 @@ _ROUNDING = 2.0**-52  # of V_j′, relative to the rest lengths in its sum, and 
 _STEPS = 200  # most steps to a root: Newton's method needs 3 to 6, bisection would need 60
 
 
-class SegmentArrays(NamedTuple):
+class Wire(NamedTuple):
     """Properties of all S segments, (S,) each: cable by cable, from the motor to the end."""
 
     length: Array  # l [m]
@@ -73,7 +73,7 @@ def _compiled(function: _Kernel) -> _Kernel:
 
 
 @_compiled
-def _surplus(wire: SegmentArrays, j: int, T: float) -> tuple[float, float]:
+def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
     """Compute the surplus of wire D_j′ = a_j − A_j(T) [m], and ∂D_j′/∂T [m/N]."""
     stretch = wire.base[j] + wire.softness[j] * T
     needed = (wire.length[j] - wire.spring[j] * (T - wire.unloaded[j])) / stretch
@@ -82,7 +82,7 @@ def _surplus(wire: SegmentArrays, j: int, T: float) -> tuple[float, float]:
 
 @_compiled
 def _slope(
-    wire: SegmentArrays, best: Array, j: int, last: int, tension: float
+    wire: Wire, best: Array, j: int, last: int, tension: float
 ) -> tuple[float, float, float]:
     """Compute V_j′ [m], ∂V_j′/∂T [m/N], Σ|l_0| [m] at ``tension``; ``best`` (S,): exp(y*_i) [N]."""
     total, rise = _surplus(wire, j, tension)
@@ -100,7 +100,7 @@ def _slope(
 
 
 @_compiled
-def _root(wire: SegmentArrays, best: Array, j: int, last: int, near: float) -> float:
+def _root(wire: Wire, best: Array, j: int, last: int, near: float) -> float:
     """Find exp(y*_j) [N], the tension at which V_j′ is zero, from ``near`` [N]; 0: slack."""
     if _slope(wire, best, j, last, 0.0)[0] >= 0.0:
         return 0.0
@@ -124,7 +124,7 @@ def _root(wire: SegmentArrays, best: Array, j: int, last: int, near: float) -> f
 
 @_compiled
 def solve_chains(
-    start: NDArray[np.intp], forced: Array, wire: SegmentArrays, near: Array
+    start: NDArray[np.intp], forced: Array, wire: Wire, near: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Compute tensions along all cables, and the wire that slips through their holes.
 

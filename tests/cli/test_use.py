@@ -22,7 +22,11 @@ COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        ("stiffness PROBE --set wire=1e9 --set series_stiffness=200 --minimum 60", 3, "UNSTABLE"),
+        (
+            "stiffness PROBE --set universal.lead=0.4 --set series_stiffness=200 --minimum 60",
+            3,
+            "UNSTABLE",
+        ),
         ("stiffness PROBE --load 0,0,-1 --set wire=48e3 --angles 5", 0, "along"),
         ("stiffness PROBE --maximum 2 --load 0,0,-50", 3, "no tension within the bounds"),
         ("stiffness PROBE --minimum 2.21 --angles 5 --check", 3, "FAIL"),

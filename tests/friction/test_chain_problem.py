@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 import cdsm
 from cdsm.friction.capstan import ChainProblem
-from cdsm.friction.capstan_kernels import SegmentArrays, solve_chains
+from cdsm.friction.capstan_kernels import Wire, solve_chains
 from cdsm.support.values import Array
 
 ROUNDING = 8.0 * np.finfo(float).eps
@@ -23,7 +23,7 @@ class Chains(NamedTuple):
 
     start: NDArray[np.intp]
     forced: Array
-    wire: SegmentArrays
+    wire: Wire
     near: Array
 
     def solve(self) -> tuple[Array, Array, NDArray[np.bool_]]:
@@ -60,7 +60,7 @@ def random_chains(seed: int, count: int, most: int) -> Chains:
     natural = (length - spring * (T - rest)) / (base + softness * T)
     length *= 1.0 + 10.0 ** rng.uniform(-7.0, -2.0, count)[of] * rng.normal(size=total)
     forced = np.where(rng.random(count) < 0.3, T[first] * rng.uniform(0.0, 2.0, count), np.nan)
-    wire = SegmentArrays(length, natural, base, softness, spring, rest, np.exp(grip))
+    wire = Wire(length, natural, base, softness, spring, rest, np.exp(grip))
     return Chains(start, forced, wire, T)
 
 
@@ -124,7 +124,7 @@ def capstan(
     length, softness = 0.1 * ones, ones / 1000.0
     natural = length / (1.0 + 50.0 * softness)
     rho = np.exp(mu * angle * ones)
-    wire = SegmentArrays(np.array([0.1, 0.1 + pulled]), natural, ones, softness, zero, zero, rho)
+    wire = Wire(np.array([0.1, 0.1 + pulled]), natural, ones, softness, zero, zero, rho)
     return Chains(np.array([0, 2]), np.array([np.nan]), wire, 50.0 * ones).solve()
 
 
