@@ -75,7 +75,7 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1, least: float = 
 
     The text is empty if no similarity, from 0 to 1, reaches ``least``.
     """
-    near = difflib.get_close_matches(name, [each for each in known if each != name], most, least)
+    near = difflib.get_close_matches(name, [other for other in known if other != name], most, least)
     return f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
 
 
@@ -90,8 +90,8 @@ def unknown(
     fitting = f"; did you mean {' or '.join(map(repr, meant[:3]))}?" if meant else ""
     hint = fitting or did_you_mean(str(name), known, 3) or "."
     error = InvalidInput(kind, "unknown")
-    said = f"no {kind} is called {name!r}{hint} Known: {listed(known, 12)}. {remedy}"
-    error.args = (said.rstrip(),)
+    message = f"no {kind} is called {name!r}{hint} Known: {listed(known, 12)}. {remedy}"
+    error.args = (message.rstrip(),)
     return error
 
 
@@ -114,9 +114,9 @@ class GeometryError(CdsmError, ValueError):
     def __init__(self, faults: Texts | str, source: str | None = None) -> None:
         self.faults = (faults,) if isinstance(faults, str) else tuple(faults)
         self.source = source
-        said = f"invalid geometry:{listed(self.faults, 20, LINES)}"
-        said = faults if isinstance(faults, str) else said
-        super().__init__(f"{source}: {said}" if source else said)
+        message = f"invalid geometry:{listed(self.faults, 20, LINES)}"
+        message = faults if isinstance(faults, str) else message
+        super().__init__(f"{source}: {message}" if source else message)
 
 
 class ElasticityRangeError(CdsmError, ValueError):
@@ -182,8 +182,8 @@ class InfeasibleTension(CdsmError):
             advice = f"Widening every bound by {wider:.4g} N would be enough (cables at a bound: "
             advice += f"{at}). Reduce the load{hint and f', or {hint}'}."
         most = f"largest at {joint} ({abs(missing).max():.4g} {units[1]})"
-        said = f"torque deficit {abs(missing).sum():.4g} {units[0]}, {most}. {advice}"
-        super().__init__(f"no tension within the bounds balances the arm: {said}")
+        message = f"torque deficit {abs(missing).sum():.4g} {units[0]}, {most}. {advice}"
+        super().__init__(f"no tension within the bounds balances the arm: {message}")
 
 
 class SingularStiffness(CdsmError, ArithmeticError):
@@ -257,9 +257,9 @@ class UnreachableStiffness(CdsmError):
             remedy += "or cables."
             if low <= 1e3 * target <= high:
                 remedy += " It looks as if the target is in N/mm: give it in N/m."
-        along = f"({', '.join(f'{each:.4g}' for each in direction)})"
-        said = f"no admissible tensions give {wanted} N/mm along {along}: the range is "
-        super().__init__(f"{said}{least} to {most} N/mm{remedy}")
+        along = f"({', '.join(f'{component:.4g}' for component in direction)})"
+        message = f"no admissible tensions give {wanted} N/mm along {along}: the range is "
+        super().__init__(f"{message}{least} to {most} N/mm{remedy}")
 
 
 def _distinct(values: Numbers) -> list[str]:

@@ -91,15 +91,15 @@ def plan(
     return answer(as_json, numbers | planned.to_dict(), head, planned, warnings=warnings)
 
 
-def _one_target(given: float | None, of_file: Array | None) -> float | Array:
+def _one_target(target: float | None, file_target: Array | None) -> float | Array:
     """Return the wanted stiffness [N/m]: that of --target, or of the path (S,)."""
-    if given is not None and of_file is None:
-        return given
-    if given is None and of_file is not None:
-        return of_file
-    said = "give it, or a column target [N/mm] in the file of the path; "
-    said += f"{'neither was' if given is None else 'both were'} given."
-    raise misuse("--target", said)
+    if target is not None and file_target is None:
+        return target
+    if target is None and file_target is not None:
+        return file_target
+    problem = "give it, or a column target [N/mm] in the file of the path; "
+    problem += f"{'neither was' if target is None else 'both were'} given."
+    raise misuse("--target", problem)
 
 
 _GRID = "Grid of joint angles [deg, or mm where they slide]: first, last and number, or one angle; "
@@ -180,9 +180,9 @@ def sweep_postures(
         write_picture(figure, lambda: cdsm.plots.plot_map(dataset, quantity))
         if bool(dataset[quantity].isnull().all()):
             warnings.append(f"{quantity} exists at none of {entries} entries")
-    lines += [f"written: {each}" for each in written]
-    told: Json = {"entries": counts, "written": written}
-    return answer(as_json, numbers | told, head, "\n".join(lines), warnings=warnings)
+    lines += [f"written: {file}" for file in written]
+    results: Json = {"entries": counts, "written": written}
+    return answer(as_json, numbers | results, head, "\n".join(lines), warnings=warnings)
 
 
 def _diameter(arm: cdsm.Manipulator, diameter: float | None, outputs: list[str]) -> float:
@@ -206,7 +206,7 @@ def _postures(
     arm: cdsm.Manipulator, grid: str | None, path: Path | None, random: int | None
 ) -> PoseSet | Array:
     """Build the set of postures from the one option that is given."""
-    if sum(given is not None for given in (grid, path, random)) != 1:
+    if sum(option is not None for option in (grid, path, random)) != 1:
         raise misuse("--grid, --path, --random", "give one of them.")
     if grid is not None:
         return _grid(grid, arm)
@@ -227,11 +227,11 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
     rest: dict[str, float] = {}
     form = "JOINT=LOW:HIGH:N or JOINT=ANGLE"
     for name, value in options.by_joint("--grid", text, arm, form).items():
-        given = options.parse_numbers("--grid", value.replace(":", ","), (1, 3), form)
-        if len(given) == 1:
-            rest[name] = units[name] * given[0]
+        numbers = options.parse_numbers("--grid", value.replace(":", ","), (1, 3), form)
+        if len(numbers) == 1:
+            rest[name] = units[name] * numbers[0]
             continue
-        low, high, count = given
+        low, high, count = numbers
         if not (2.0 <= count <= 1e6 and count.is_integer() and low != high):
             raise misuse("--grid", f"{name}={value}: give LOW:HIGH:N with 2 to 10^6 angles.")
         angles[name] = units[name] * np.linspace(low, high, int(count))
@@ -286,9 +286,9 @@ def design(
     number = results.compromise if choose is None else choose
     front = write_text(folder / "front.csv", results.best.to_csv())
     if number >= (count := len(results.front)):
-        given = f"{number} given, but the front has the designs 0 to {count - 1}. See {front}, and"
+        designs = f"{number} given, but the front has the designs 0 to {count - 1}. See {front}"
         again = "repeat the command with one of them, which takes no search."
-        raise misuse("--choose", f"{given} {again}")
+        raise misuse("--choose", f"{designs}, and {again}")
     paths = [
         table,
         front,
@@ -298,5 +298,5 @@ def design(
     ]
     names = ", ".join(path.name for path in paths)
     written: Json = {"written": [str(path) for path in paths], "chosen": number}
-    said = f"design {number} is written to {folder}: {names}"
-    return answer(as_json, results.to_dict() | written, results.describe(number), said)
+    summary = f"design {number} is written to {folder}: {names}"
+    return answer(as_json, results.to_dict() | written, results.describe(number), summary)

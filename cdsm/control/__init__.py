@@ -15,13 +15,13 @@ from cdsm.control.laws import (
 )
 from cdsm.control.plants import Plant, PlantState
 from cdsm.control.run import TrackingRun
-from cdsm.control.sensing import Measurement, with_rigidity
+from cdsm.control.sensing import MotorMeasurement, with_rigidity
 
 __all__ = [
     "Command",
     "ControlInput",
     "Law",
-    "Measurement",
+    "MotorMeasurement",
     "Plant",
     "PlantState",
     "Reference",

@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.control.sensing import Estimate, Measurement, with_rigidity
+from cdsm.control.sensing import Estimate, MotorMeasurement, with_rigidity
 from cdsm.errors import CdsmError, InvalidInput, UnreachableStiffness
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path_plan import PathPlan
@@ -86,7 +86,7 @@ class ControlInput(NamedTuple):
 
     reference: Reference
     reference_before: Reference
-    measurement: Measurement
+    measurement: MotorMeasurement
     error_before: Array
     paid_out: Array
     minimum: Array
@@ -103,30 +103,32 @@ Law = Callable[[ControlInput], Command]
 """A motor law: it computes the command of one step."""
 
 
-def limited(given: ControlInput, paid_out: Array) -> Command:
+def limited(control_input: ControlInput, paid_out: Array) -> Command:
     """Return the command to pay out l_0 (C,) [m], changed to keep the tensions within the bounds.
 
     The tensions after the step are predicted as the top of the module says. Raises InvalidInput if
     ``paid_out`` is not one number per cable.
     """
-    now = given.reference
-    before = given.reference_before
-    k = given.reference.stiffness
+    now = control_input.reference
+    before = control_input.reference_before
+    k = control_input.reference.stiffness
     length = vector("wire of the law", paid_out, k.size, "one length [m] per cable")
-    surplus = (now.paid_out - before.paid_out) - (length - given.measurement.paid_out)
-    predicted = given.measurement.tension + (now.tension - before.tension) + k * surplus
-    return _clamped(given, length, np.where(k > 0.0, predicted, now.tension))
+    surplus = (now.paid_out - before.paid_out) - (length - control_input.measurement.paid_out)
+    predicted = control_input.measurement.tension + (now.tension - before.tension) + k * surplus
+    return _clamped(control_input, length, np.where(k > 0.0, predicted, now.tension))
 
 
-def feedforward(given: ControlInput) -> Command:
+def feedforward(control_input: ControlInput) -> Command:
     """Pay out the lengths of wire of the plan; this law needs no sensor.
 
     The planned l_0 allow for the stretch of the wires under the planned tensions.
     """
-    return _clamped(given, given.reference.paid_out, given.reference.tension)
+    return _clamped(
+        control_input, control_input.reference.paid_out, control_input.reference.tension
+    )
 
 
-def tension_control(given: ControlInput) -> Command:
+def tension_control(control_input: ControlInput) -> Command:
     """Control all cable tensions by PI control, in addition to the planned changes of l_0.
 
     In each step, Δl_0 = Δl_0 planned − (P Δe + I e)/k with the tension error e, its change Δe since
@@ -134,17 +136,20 @@ def tension_control(given: ControlInput) -> Command:
     needs a load cell. No motor controls a length, so an arm without springs in its joints drifts
     slowly from its posture.
     """
-    return limited(given, _regulated(given))
+    return limited(control_input, _regulated(control_input))
 
 
-def mixed(given: ControlInput) -> Command:
+def mixed(control_input: ControlInput) -> Command:
     """Control the tension of some cables, and pay out the wire of the plan for all others.
 
     In the paper's arm, the tension of one cable of each pair is controlled. Every cable needs a
     load cell, since the law keeps the tensions of all cables within their bounds.
     """
-    planned = given.reference.paid_out
-    return limited(given, np.where(given.tension_controlled, _regulated(given), planned))
+    planned = control_input.reference.paid_out
+    return limited(
+        control_input,
+        np.where(control_input.tension_controlled, _regulated(control_input), planned),
+    )
 
 
 LAWS: Final[dict[str, Law]] = {
@@ -156,45 +161,47 @@ LAWS: Final[dict[str, Law]] = {
 """Laws by name; ``stiffness`` is the mixed law inside the stiffness loop."""
 
 
-def checked_command(command: object, given: ControlInput, names: Sequence[str]) -> Command:
+def checked_command(command: object, control_input: ControlInput, names: Sequence[str]) -> Command:
     """Check and return the ``command`` of a law to the motors ``names`` (C,).
 
     Raises InvalidInput unless each commanded length of wire is positive, and each tension is within
     the bounds.
     """
     if not isinstance(command, Command):
-        said = f"returned {command!r}; a Command is needed: return limited(given, paid_out)."
-        raise InvalidInput("law", said)
+        problem = (
+            f"returned {command!r}; a Command is needed: return limited(control_input, paid_out)."
+        )
+        raise InvalidInput("law", problem)
     wire = vector("wire of the law", command.paid_out, len(names), "one length [m] per cable")
     tension = vector("tension of the law", command.tension, len(names), "one [N] per cable")
-    low = given.minimum - _ROUNDING
-    high = given.maximum + _ROUNDING
+    low = control_input.minimum - _ROUNDING
+    high = control_input.maximum + _ROUNDING
     wrong = ~((wire > 0.0) & (low <= tension) & (tension <= high))
     if wrong.any():
         c = int(wrong.argmax())
         raise InvalidInput(
             "law",
             f"commanded {tension[c]:.6g} N and {wire[c]:.6g} m of wire for {names[c]}; a tension "
-            f"from {given.minimum[c]:g} to {given.maximum[c]:g} N and a positive length are "
-            "needed. Return limited(given, paid_out).",
+            f"from {control_input.minimum[c]:g} to {control_input.maximum[c]:g} N and a positive "
+            "length are needed. Return limited(control_input, paid_out).",
         )
     return command
 
 
-def _regulated(given: ControlInput) -> Array:
+def _regulated(control_input: ControlInput) -> Array:
     """Return l_0 (C,) [m] to pay out if PI control holds the tension of each cable."""
-    now = given.reference
-    k = given.reference.stiffness
-    error = given.error
-    correction = PROPORTIONAL * (error - given.error_before) + INTEGRAL * error
+    now = control_input.reference
+    k = control_input.reference.stiffness
+    error = control_input.error
+    correction = PROPORTIONAL * (error - control_input.error_before) + INTEGRAL * error
     taken_in = np.divide(correction, k, out=np.zeros_like(k), where=k > 0.0)
-    planned = now.paid_out - given.reference_before.paid_out
-    return np.asarray(given.paid_out + planned - taken_in)
+    planned = now.paid_out - control_input.reference_before.paid_out
+    return np.asarray(control_input.paid_out + planned - taken_in)
 
 
-def _clamped(given: ControlInput, paid_out: Array, predicted: Array) -> Command:
-    tension = np.minimum(np.maximum(predicted, given.minimum), given.maximum)
-    k = given.reference.stiffness
+def _clamped(control_input: ControlInput, paid_out: Array, predicted: Array) -> Command:
+    tension = np.minimum(np.maximum(predicted, control_input.minimum), control_input.maximum)
+    k = control_input.reference.stiffness
     beyond = np.divide(predicted - tension, k, out=np.zeros_like(k), where=k > 0.0)
     return Command(np.asarray(paid_out + beyond), tension, np.asarray(tension != predicted))
 
@@ -286,8 +293,8 @@ class StiffnessLoop:
     def _calibrate(self, softness: float) -> None:
         """Divide the rigidity of the wires by the estimated ``softness`` 1/s, if that changed."""
         if softness <= 0.0:  # far from the posture of the plan, measurements fit no wire
-            said = f"estimated as {1.0 / softness:.3g} times that of the wires' laws."
-            raise InvalidInput("rigidity", said)
+            problem = f"estimated as {1.0 / softness:.3g} times that of the wires' laws."
+            raise InvalidInput("rigidity", problem)
         if abs(softness - self._softness) > _SOFTER:
             self._softness = softness
             self._arm = with_rigidity(self._plan.arm, 1.0 / softness)

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple, Protocol, TypeVar, final
 import numpy as np
 
 from cdsm.control.laws import Command
-from cdsm.control.sensing import Measurement
+from cdsm.control.sensing import MotorMeasurement
 from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput, need
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
@@ -37,7 +37,7 @@ class PlantState(Protocol):
         """The true posture."""
 
     @property
-    def true_values(self) -> Measurement:
+    def true_values(self) -> MotorMeasurement:
         """True length of the wire paid out [m] and tension [N] at each motor, both (C,)."""
 
 
@@ -64,7 +64,7 @@ class Plant(Protocol[AnyState]):
         """
 
 
-class QuasiStaticState(NamedTuple):
+class QuasiStaticPlantState(NamedTuple):
     """State of a :class:`QuasiStaticPlant`: the wire in each segment depends on earlier loads."""
 
     loading: QuasiStaticArm
@@ -77,11 +77,11 @@ class QuasiStaticState(NamedTuple):
         return self.state.arm_state.pose
 
     @property
-    def true_values(self) -> Measurement:
+    def true_values(self) -> MotorMeasurement:
         """True length of the wire paid out [m] and tension [N] at each motor, both (C,)."""
         taken_in = np.where(self.loading.forced, 0.0, self.state.load.motors)
         tension = self.state.arm_state.tension[self.loading.start[:-1]]
-        return Measurement(frozen(self.initial_paid_out - taken_in), frozen(tension))
+        return MotorMeasurement(frozen(self.initial_paid_out - taken_in), frozen(tension))
 
 
 @final
@@ -107,14 +107,16 @@ class QuasiStaticPlant:
         instance("arm", self.arm, Manipulator)
         whole_number("substeps", self.substeps, 1)
 
-    def initial(self, q: Array, tension: Array, wrench: Array) -> QuasiStaticState:
+    def initial(self, q: Array, tension: Array, wrench: Array) -> QuasiStaticPlantState:
         """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
         pose = self.arm.at(q)
         loading = QuasiStaticArm(pose, tension)
         paid_out = self.arm.laws.original_lengths(pose.cable_lengths, tension)
-        return QuasiStaticState(loading, paid_out, loading.initial(wrench))
+        return QuasiStaticPlantState(loading, paid_out, loading.initial(wrench))
 
-    def step_to(self, state: QuasiStaticState, command: Command, wrench: Array) -> QuasiStaticState:
+    def step_to(
+        self, state: QuasiStaticPlantState, command: Command, wrench: Array
+    ) -> QuasiStaticPlantState:
         """Return the state after ``state``, as :meth:`Plant.step_to` describes.
 
         Raises EquilibriumError if the arm buckles.
@@ -165,7 +167,7 @@ class MuJoCoState(NamedTuple):
 
     model: Any  # mujoco.MjModel, never changed
     pose: Posture  # true posture
-    true_values: Measurement  # true wire and tension at the motors
+    true_values: MotorMeasurement  # true wire and tension at the motors
     joints: Array  # coordinates of all joints [rad], and their velocities [rad/s] (2, n)
 
 
@@ -212,7 +214,7 @@ class MuJoCoPlant:
         paid_out = self.arm.laws.original_lengths(pose.cable_lengths, tension)
         model = mujoco.MjModel.from_xml_string(text)
         joints = frozen(np.array([model.qpos0, 0.0 * model.qpos0]))
-        return MuJoCoState(model, pose, Measurement(paid_out, tension), joints)
+        return MuJoCoState(model, pose, MotorMeasurement(paid_out, tension), joints)
 
     def step_to(self, state: MuJoCoState, command: Command, wrench: Array) -> MuJoCoState:
         """Return the state one period after ``state``, under a command and a wrench (6,).
@@ -241,10 +243,10 @@ class MuJoCoPlant:
             raise CdsmError(
                 "the simulation diverges: the arm moves beyond all bounds", Status.DIVERGED
             )
-        own = [model.joint(name).qposadr[0] for name in self.arm.joint_names]
-        pose = self.arm.at(data.qpos[own], check_limits=False)
+        rows = [model.joint(name).qposadr[0] for name in self.arm.joint_names]
+        pose = self.arm.at(data.qpos[rows], check_limits=False)
         F = _tensions_of(self.arm, pose.cable_lengths, command.paid_out, command.tension)
-        true_values = Measurement(command.paid_out, frozen(F))
+        true_values = MotorMeasurement(command.paid_out, frozen(F))
         joints = frozen(np.array([data.qpos, data.qvel]))
         return MuJoCoState(state.model, pose, true_values, joints)
 

@@ -156,33 +156,33 @@ class TrackingRun(Result, Plotted):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Faults of the run, worst first; empty if there are none."""
-        said = []
+        warnings = []
         if self.outcome is not Status.OK:
             end = self.time.max(initial=0.0)
-            said.append(f"{self.outcome.title} at {end:.4g} s: {self.reason}")
+            warnings.append(f"{self.outcome.title} at {end:.4g} s: {self.reason}")
         if unstable := np.flatnonzero(~(self.margin > 0.0)).tolist():
-            said.append(f"UNSTABLE {self._at(unstable)}: without friction the arm would buckle")
+            warnings.append(f"UNSTABLE {self._at(unstable)}: without friction the arm would buckle")
         if unbalanced := np.flatnonzero(~self.reference_balanced).tolist():
-            said.append(
+            warnings.append(
                 f"OUT OF BALANCE {self._at(unbalanced)}: between samples of the plan no tensions "
                 "within the domains of the laws balance the arm; give the path more samples"
             )
         if failed := sorted(self.replan_failed):
-            said.append(f"NOT PLANNED {self._at(failed)}: {self.replan_failed[failed[0]]}")
+            warnings.append(f"NOT PLANNED {self._at(failed)}: {self.replan_failed[failed[0]]}")
         if unreachable := np.flatnonzero(self.target_unreachable).tolist():
-            said.append(
+            warnings.append(
                 f"OUT OF REACH {self._at(unreachable)}: within the bounds no tensions were found "
                 "that give the target"
             )
         limited = np.flatnonzero(self.change_limited).tolist()
         if limited and self.steps_needed > self.steps:
             most = abs(np.diff(self.plan.tensions, axis=0)).max()
-            said.append(
+            warnings.append(
                 f"TOO FEW STEPS {self._at(limited)}: tensions of the plan change by up to "
                 f"{most:.3g} N from sample to sample, and by max_change_per_step in one step; "
                 f"steps={self.steps_needed} would do"
             )
-        return tuple(said)
+        return tuple(warnings)
 
     def _at(self, steps: Sequence[int]) -> str:
         """Return text such as ``at 3 of 40 steps, from 0.2 s`` for these numbers of steps."""

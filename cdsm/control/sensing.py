@@ -39,7 +39,7 @@ _STEPS = 8  # most Gauss–Newton steps, and the step [rad] that ends them
 _CONVERGED = 1e-8
 
 
-class Measurement(NamedTuple):
+class MotorMeasurement(NamedTuple):
     """Values at the motors at one step, as measured or true.
 
     Attributes:
@@ -86,8 +86,8 @@ class Sensors:
         whole_number("seed", self.seed, 0)
 
     def measure(
-        self, true_values: Sequence[Measurement], random: np.random.Generator
-    ) -> Measurement:
+        self, true_values: Sequence[MotorMeasurement], random: np.random.Generator
+    ) -> MotorMeasurement:
         """Measure the newest of the ``true_values``, or an earlier one if there is a delay.
 
         The noise is drawn from ``random``; each call draws the same number of random numbers.
@@ -97,7 +97,9 @@ class Sensors:
         if self.encoder:
             counted = self.encoder * np.round(counted / self.encoder)
         draws = np.clip(random.standard_normal(counted.size), -_LARGEST_NOISE, _LARGEST_NOISE)
-        return Measurement(counted, now.tension + self.tension_bias + self.tension_noise * draws)
+        return MotorMeasurement(
+            counted, now.tension + self.tension_bias + self.tension_noise * draws
+        )
 
 
 class Estimate(NamedTuple):
@@ -122,7 +124,7 @@ class Observer:
     arm: Manipulator
     sensors: Sensors
 
-    def initial(self, q: Array, measured: Measurement) -> Estimate:
+    def initial(self, q: Array, measured: MotorMeasurement) -> Estimate:
         """Return the first estimate, at known joint angles (nv,), with even tensions of cables."""
         pose = self.arm.at(q)
         cable = pose.segments.chains.cable
@@ -133,7 +135,7 @@ class Observer:
         force = self._tip_force(pose, T)
         return Estimate(pose, one, force, 1.0, _UNSURE**2, rest_length, shares)
 
-    def update(self, before: Estimate, measured: Measurement) -> Estimate:
+    def update(self, before: Estimate, measured: MotorMeasurement) -> Estimate:
         """Return the estimate after one more measurement; ``before`` is the previous estimate."""
         locked = self.arm.cables.position_controlled
         laws = self.arm.laws
@@ -144,8 +146,8 @@ class Observer:
         x = before.softness
         strain = self._mean_strain(pose, before.shares, F)
         soft = np.array(laws.series)
-        for law, of in self._problem.laws:
-            soft[of] += x * wire[of] / law.rigidity(F[of])
+        for law, cables in self._problem.laws:
+            soft[cables] += x * wire[cables] / law.rigidity(F[cables])
         spring = laws.series * (F - laws.rest)
         # an error of the tension stretches the cable; the encoder rounds by half a count at most
         counting = max(self.sensors.encoder / math.sqrt(12.0), _FINEST)
@@ -196,8 +198,8 @@ class Observer:
         spread = np.hypot(max(self._tension_spread, _LEAST_SPREAD), friction_exponents(pose) * F)
         weights = np.linalg.pinv(pose.length_jacobian.T * spread)
         torque = tension @ segments.length_jacobian + torque_of(pose.arm.terms, pose)
-        found = np.linalg.lstsq(weights @ pose.jacobian[:3].T, weights @ torque, rcond=None)
-        return np.asarray(found[0])
+        solution = np.linalg.lstsq(weights @ pose.jacobian[:3].T, weights @ torque, rcond=None)
+        return np.asarray(solution[0])
 
     def _mean_strain(self, pose: Posture, shares: Array, F: Array) -> Array:
         """Compute the mean strains ε̄ (C,) [-] from F (C,) [N] at the motors and shares ρ (S,)."""
@@ -205,8 +207,8 @@ class Observer:
         chains = segments.chains
         T = shares * F[chains.cable]
         strain = np.zeros(segments.lengths.size)
-        for law, of in self._problem.laws:
-            mine = np.isin(chains.cable, of)
+        for law, cables in self._problem.laws:
+            mine = np.isin(chains.cable, cables)
             strain[mine] = law.strain(np.clip(T[mine], law.low, law.high))
         total = np.add.reduceat(strain * segments.lengths, chains.start[:-1])
         return np.asarray(total / pose.cable_lengths)

@@ -104,25 +104,27 @@ def track(
     if not plan.complete:
         first = plan.infeasible[0]
         lacking = f"{len(plan.infeasible)} of {len(plan.target)}"
-        said = f"{lacking} samples are not planned, the first of them sample {first.index}"
-        raise InvalidInput("plan", f"{said}: {first.reason}")
+        problem = f"{lacking} samples are not planned, the first of them sample {first.index}"
+        raise InvalidInput("plan", f"{problem}: {first.reason}")
     low, high = checked_bounds(arm, minimum, maximum)
     name = law if isinstance(law, str) else getattr(law, "__name__", "custom")
     command_of = law if callable(law) else LAWS[one_of("law", law, LAWS)]
     sensors = Sensors() if sensors is None else instance("sensors", sensors, Sensors)
     plant = QuasiStaticPlant(arm) if plant is None else plant
     if isinstance(plant, type) or not hasattr(plant, "step_to"):  # an arm by itself, for example
-        said = f"{plant!r} given; a plant is needed, such as QuasiStaticPlant(arm)."
-        raise InvalidInput("plant", said)
-    own, its = ((*each.joint_names, *each.cables.names) for each in (arm, plant.arm))
-    if own != its:
-        other = listed(sorted({*own} ^ {*its}) or its)
+        problem = f"{plant!r} given; a plant is needed, such as QuasiStaticPlant(arm)."
+        raise InvalidInput("plant", problem)
+    planned_names = (*arm.joint_names, *arm.cables.names)
+    plant_names = (*plant.arm.joint_names, *plant.arm.cables.names)
+    if planned_names != plant_names:
+        other = listed(sorted({*planned_names} ^ {*plant_names}) or plant_names)
         raise InvalidInput(
             "plant", f"its arm and that of the plan differ in joints or cables: {other}."
         )
-    if (its_own := getattr(plant, "period", period)) != period:
-        said = f"{period!r} s given, but a step of the plant takes {its_own!r} s; give it here too."
-        raise InvalidInput("period", said)
+    plant_period = getattr(plant, "period", period)
+    if plant_period != period:
+        step = f"a step of the plant takes {plant_period!r} s"
+        raise InvalidInput("period", f"{period!r} s given, but {step}; give it here too.")
     count = whole_number("steps", steps, 1, _MOST_STEPS)
     change = checked_change("max_change_per_step", arm, max_change_per_step)
     outer = StiffnessLoop(plan, low, high, change) if name == "stiffness" else None
@@ -177,8 +179,8 @@ def _follow(
             replanned = outer.next(reference, wanted.target, estimate, last)
         reference = replanned.reference
         before = replanned.reference_before
-        given = ControlInput(reference, before, measured, error, paid_out, *bounds, forced)
-        command = checked_command(law(given), given, plan.arm.cables.names)
+        control_input = ControlInput(reference, before, measured, error, paid_out, *bounds, forced)
+        command = checked_command(law(control_input), control_input, plan.arm.cables.names)
         try:
             state = plant.step_to(state, command, wanted.wrench)
         except CdsmError as fault:
@@ -186,7 +188,7 @@ def _follow(
         true_values.append(state.true_values)
         last = reference
         paid_out = command.paid_out
-        error = given.error
+        error = control_input.error
         tip = state.pose.tip[:3, 3]
         rows.append(
             {
@@ -283,28 +285,28 @@ def _tension_controlled(pose: Posture) -> NDArray[np.bool_]:
 
 def _assessed(state: PlantState, wrench: Array, directions: Array) -> dict[str, Any]:
     """Return true stiffness, margin and band, and how far the tip is off its centre; or NaN."""
-    found: dict[str, Any] = dict.fromkeys(("margin", "band", "displacement"), math.nan)
-    found["stiffness"] = np.full(len(directions), math.nan)
+    assessment: dict[str, Any] = dict.fromkeys(("margin", "band", "displacement"), math.nan)
+    assessment["stiffness"] = np.full(len(directions), math.nan)
     with suppress(CdsmError):
         K = frictionless_stiffness(state, wrench)
-        found["margin"] = K.margin
+        assessment["margin"] = K.margin
         off = state.pose.tip[:3, 3] - K.posture.tip[:3, 3]
-        found["displacement"] = off @ directions[0]
-        found["stiffness"] = np.array([K.along(u) for u in directions])
+        assessment["displacement"] = off @ directions[0]
+        assessment["stiffness"] = np.array([K.along(u) for u in directions])
         if K.posture.arm.has_friction and K.is_stable:
-            found["band"] = half_width(K, directions[0])
-    return found
+            assessment["band"] = half_width(K, directions[0])
+    return assessment
 
 
 def _columns(rows: list[dict[str, Any]], arm: Manipulator, directions: int) -> dict[str, Any]:
     """Stack the rows of a run, with the dimensions that the fields of TrackingRun tell."""
     sizes = {"cable": len(arm.cables), "joint": arm.nv, "axis": 3, "component": 6}
     sizes |= {"time": len(rows), "direction": directions}
-    found: dict[str, Any] = {}
-    for each in fields(TrackingRun):
-        dims = each.metadata.get("dims", ())
+    columns: dict[str, Any] = {}
+    for column in fields(TrackingRun):
+        dims = column.metadata.get("dims", ())
         if dims[:1] == ("time",):
-            values = np.array([row[each.name] for row in rows])
-            kind = np.bool_ if "bool" in str(each.type) else np.float64
-            found[each.name] = frozen(values.astype(kind).reshape([sizes[dim] for dim in dims]))
-    return found
+            values = np.array([row[column.name] for row in rows])
+            kind = np.bool_ if "bool" in str(column.type) else np.float64
+            columns[column.name] = frozen(values.astype(kind).reshape([sizes[dim] for dim in dims]))
+    return columns

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from cdsm.errors import UnreachableStiffness
 from cdsm.planning.range import AT_END, End, downhill, ends, farther
-from cdsm.planning.tension_space import Limits, TensionSpace
+from cdsm.planning.tension_space import TensionLimits, TensionSpace
 from cdsm.support.values import Array
 from cdsm.tension import advice
 
@@ -48,7 +48,7 @@ class Goal:
         return F is not None and self.space.reserve(F) > -REACHED and self.misfit(F) <= REACHED
 
     def search(
-        self, start: Array, bounds: Limits | None = None, centre: Array | float = 0.0
+        self, start: Array, bounds: TensionLimits | None = None, centre: Array | float = 0.0
     ) -> Array | None:
         """Search from ``start`` for the tensions nearest to ``centre`` that meet the goal, locally.
 
@@ -143,7 +143,7 @@ class Goal:
         nearest = [first, last] if first <= target <= last else [end.value]
         return UnreachableStiffness(u, target, first, last, nearest, hint)
 
-    def nearest(self, start: Array, bounds: Limits | None = None) -> Array | None:
+    def nearest(self, start: Array, bounds: TensionLimits | None = None) -> Array | None:
         """Search once for the tensions (C,) [N] with the least sum of squared misses, if any."""
 
         def miss(F: Array) -> tuple[float, Array]:

@@ -51,7 +51,7 @@ _DIGITS = 6  # decimal places of tensions, over the largest of the least, in whi
 Function = Callable[[Array], tuple[Any, Array]]
 """Function of F (C,) that returns its value, () or (n,), and its gradient, (C,) or (n, C)."""
 
-Limits = tuple[Array, Array]
+TensionLimits = tuple[Array, Array]
 """Lower and upper bounds of the tensions, (C,) [N] each."""
 
 
@@ -135,7 +135,7 @@ class TensionSpace:
         k = pose.arm.laws.stiffness(pose.cable_lengths, F)
         return self.constant_stiffness + np.tensordot(F, pose.length_hessian, 1) + (J.T * k) @ J, k
 
-    def nearest(self, F: Array, bounds: Limits | None = None) -> Array | None:
+    def nearest(self, F: Array, bounds: TensionLimits | None = None) -> Array | None:
         """Return the balanced tensions (C,) [N] nearest to F within the bounds, if any."""
         solution = nearest_balanced(self._balance, F, *(bounds or self.bounds))
         return solution.x if solution.ok else None
@@ -144,7 +144,7 @@ class TensionSpace:
         """Return F (C,) [N] as a :class:`Tension`."""
         return replace(self.least, values=frozen(F.copy()), least=False)
 
-    def within(self, F: Array, change: Array) -> Limits:
+    def within(self, F: Array, change: Array) -> TensionLimits:
         """Return the bounds of tensions that differ from F by ``change`` at most, (C,) [N] each."""
         return np.maximum(self.bounds[0], F - change), np.minimum(self.bounds[1], F + change)
 
@@ -153,7 +153,7 @@ class TensionSpace:
         start: Array,
         objective: Function,
         *rules: tuple[str, Function],
-        bounds: Limits | None = None,
+        bounds: TensionLimits | None = None,
         stable: bool = True,
         precision: float = 1e-12,
         iterations: int = 100,
@@ -284,7 +284,7 @@ def form_by_tension(pose: Posture, slope: Array, left: Array, right: Array) -> A
     return np.asarray(active + passive)
 
 
-def unstable(K: Stiffness, tried: str, bounds: Limits | None = None) -> SingularStiffness:
+def unstable(K: Stiffness, tried: str, bounds: TensionLimits | None = None) -> SingularStiffness:
     """Return the error that none of the tensions ``tried`` make the arm stable; K is the best."""
     arm = K.posture.arm
     problem = f"no {tried} make the arm stable. At best: {verdict(K)}. {too_few_cables(arm)}"

@@ -104,9 +104,9 @@ def _narrowed(arm: Manipulator, low: Array, high: Array) -> tuple[Array, Array]:
     if not 0.0 <= asked < math.inf:
         only = "cables only pull, so it must be finite and not negative"
         raise InvalidInput("minimum", f"{asked:g} N given for {cable}; {only}.")
-    own = "the cable's own "
-    problem = f"{ceiling:g} N ({own * (ceiling < limit)}maximum) for {cable} is below {floor:g} N"
-    problem += f" ({own * (floor > asked)}minimum); raise the one or lower the other."
+    whose = "the cable's own "
+    problem = f"{ceiling:g} N ({whose * (ceiling < limit)}maximum) for {cable} is below {floor:g} N"
+    problem += f" ({whose * (floor > asked)}minimum); raise the one or lower the other."
     raise InvalidInput("maximum", problem)
 
 

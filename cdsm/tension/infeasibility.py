@@ -13,10 +13,12 @@ from cdsm.posture import Posture
 from cdsm.support.format import plural
 from cdsm.support.values import Array, frozen
 from cdsm.tension.least_tensions import nearest_tensions
-from cdsm.tension.solvers import OPTIMALITY, Problem, minimise
+from cdsm.tension.solvers import OPTIMALITY, TensionProblem, minimise
 
 
-def infeasible(pose: Posture, problem: Problem, free: NDArray[np.bool_]) -> InfeasibleTension:
+def infeasible(
+    pose: Posture, problem: TensionProblem, free: NDArray[np.bool_]
+) -> InfeasibleTension:
     """Find by linear programs what is missing, and how far which bounds must widen.
 
     ``problem`` has no solution. ``free`` (C,) marks the cables without a fixed tension; only their
@@ -55,7 +57,7 @@ def advice(
     text is such as "lower minimum, raise the maximum of cable1_1 itself", or empty.
     """
     near = OPTIMALITY * max(float(F.max()), 1.0)
-    found: dict[str, list[str]] = {}
+    cables: dict[str, list[str]] = {}
     for c, cable in enumerate(arm.cables):
         law = cable.elasticity if cable.control == "position" else None
         for tight, value, verb, side, end in (
@@ -68,8 +70,8 @@ def advice(
                     rule = f"{verb} the {side} of % itself"
                 elif value == end:
                     rule = f"take another law than one that ends at {value:.4g} N for %"
-                found.setdefault(rule, []).append(cable.name)
-    return ", ".join(rule.replace("%", listed(names)) for rule, names in found.items())
+                cables.setdefault(rule, []).append(cable.name)
+    return ", ".join(rule.replace("%", listed(names)) for rule, names in cables.items())
 
 
 def too_few_cables(arm: Manipulator) -> str:
@@ -79,16 +81,16 @@ def too_few_cables(arm: Manipulator) -> str:
     if count > joints:
         return ""
     if arm.has_springs:
-        said = (
+        held = (
             f"{plural(count, 'cable')} and springs hold {plural(joints, 'joint')} only where they"
         )
         finds = "forward_statics(arm, tension=...) finds it (command: cdsm stiffness --tension)"
-        return f"{said} come to rest: {finds}. "
+        return f"{held} come to rest: {finds}. "
     needed = f"cables only pull, so at least {joints + 1} are needed"
     return f"{plural(count, 'cable')} alone cannot hold {plural(joints, 'joint')}: {needed}. "
 
 
-def _widening(problem: Problem, free: NDArray[np.bool_]) -> float:
+def _widening(problem: TensionProblem, free: NDArray[np.bool_]) -> float:
     """Compute how far the bounds of ``free`` cables (C,) must widen [N]; inf if nothing helps."""
     A, b, low, high, _, force = problem
     nv, count = A.shape

@@ -17,8 +17,8 @@ from cdsm.tension.solvers import (
     DEFAULT_SOLVER,
     HINT,
     OPTIMALITY,
-    Problem,
     Solution,
+    TensionProblem,
     minimise,
     no_solution,
     solve,
@@ -28,7 +28,7 @@ _PROOF: Final = 1e-8  # least missing torque, per largest moment arm × force, t
 _ROUNDING: Final = 1e-11  # a cable that pulls less than this against it does not pull
 
 
-def least_tensions(problem: Problem, solver: str, *, proof_first: bool = False) -> Solution:
+def least_tensions(problem: TensionProblem, solver: str, *, proof_first: bool = False) -> Solution:
     """Return the least tensions F (C,) [-] within the bounds that balance the arm.
 
     The status is INFEASIBLE if it is proved that no tensions do, and SOLVER_FAILED if the solver
@@ -57,24 +57,26 @@ def least_tensions(problem: Problem, solver: str, *, proof_first: bool = False) 
 
 
 def nearest_balanced(
-    problem: Problem, F: Array, low: Array, high: Array, solver: str = DEFAULT_SOLVER
+    problem: TensionProblem, F: Array, low: Array, high: Array, solver: str = DEFAULT_SOLVER
 ) -> Solution:
     """Return the tensions (C,) [N] in balance that are nearest to F (C,) [N].
 
     ``low`` and ``high`` (C,) [N] are their bounds; those of ``problem`` do not count.
     """
     A, b, *_, arm, force = problem
-    shifted = Problem(A, b - A @ (F / force), (low - F) / force, (high - F) / force, arm, force)
+    shifted = TensionProblem(
+        A, b - A @ (F / force), (low - F) / force, (high - F) / force, arm, force
+    )
     change = solve(shifted, solver)
     return replace(change, x=np.clip(F + force * change.x, low, high))
 
 
-def missing_torque(problem: Problem, F: Array) -> float:
+def missing_torque(problem: TensionProblem, F: Array) -> float:
     """Return Σ|b − A F| [-]: the torque that the tensions F (C,) [-] miss."""
     return float(abs(problem.b - problem.A @ F).sum())
 
 
-def is_proved_infeasible(problem: Problem) -> bool:
+def is_proved_infeasible(problem: TensionProblem) -> bool:
     """Whether there is a quick proof that no tensions within the bounds balance the arm.
 
     With x = F − low ≥ 0, the residual r of min ‖A x − b‖ is a proof by Farkas: rᵀA ≤ 0 < rᵀb.
@@ -101,7 +103,7 @@ def is_proved_infeasible(problem: Problem) -> bool:
     return bool(proof and ((r @ A) <= _ROUNDING * most).all())
 
 
-def nearest_tensions(problem: Problem) -> Solution:
+def nearest_tensions(problem: TensionProblem) -> Solution:
     """Return the tensions F (C,) [-] within the bounds that miss the balance least, Σ|b − A F|."""
     A, b, low, high, *_ = problem
     nv, count = A.shape

@@ -46,7 +46,7 @@ _SETTINGS: Final[dict[str, dict[str, Any]]] = {
 }
 
 
-class Problem(NamedTuple):
+class TensionProblem(NamedTuple):
     """Balance of an arm, J_Lᵀ F = J_Xᵀ W − g with bounds of F, in dimensionless form."""
 
     A: Array  # J_Lᵀ / arm (nv, C)
@@ -89,14 +89,16 @@ def without_warnings() -> Iterator[None]:
         yield
 
 
-def nondimensional(J: Array, torque: Array, low: Array, high: Array, length: float) -> Problem:
+def nondimensional(
+    J: Array, torque: Array, low: Array, high: Array, length: float
+) -> TensionProblem:
     """Scale the balance ``J``ᵀ F = ``torque`` of an arm, without rounding; J_L is (C, nv)."""
     arm = 2.0 ** math.frexp(abs(J).max())[1]
     A = J.T / arm
     b = torque / arm
     A[abs(A) < NO_ARM * length / arm] = 0.0
     force = 2.0 ** math.frexp(max(abs(b).max(), low.max()))[1]
-    return Problem(A, b / force, low / force, high / force, arm, force)
+    return TensionProblem(A, b / force, low / force, high / force, arm, force)
 
 
 def installed_solvers() -> list[str]:
@@ -106,7 +108,7 @@ def installed_solvers() -> list[str]:
     return sorted(qpsolvers.available_solvers)
 
 
-def solve(problem: Problem, solver: str) -> Solution:
+def solve(problem: TensionProblem, solver: str) -> Solution:
     """Return the verified optimum x (C,) [-]; SOLVER_FAILED if the solver finds none.
 
     Raises InvalidInput if the solver is not installed.
@@ -159,14 +161,14 @@ def _independent(A: Array) -> Array:
     return np.asarray(U[:, known] / size[known])
 
 
-def violation(problem: Problem, x: Array, y: Array) -> float:
+def violation(problem: TensionProblem, x: Array, y: Array) -> float:
     """Return the largest violation of A x = b and x = clip(−Aᵀ y, low, high), per largest force."""
     A, b, low, high, *_ = problem
     missed = np.concatenate((A @ x - b, np.minimum(np.maximum(-(y @ A), low), high) - x))
     return float(abs(missed).max() / max(1.0, abs(x).max()))
 
 
-def _corrected(problem: Problem, x: Array, y: Array) -> tuple[Array, Array]:
+def _corrected(problem: TensionProblem, x: Array, y: Array) -> tuple[Array, Array]:
     """Solve by least squares with the bounds that are active at x."""
     A, b, low, high, *_ = problem
     free = (low < x) & (x < high)

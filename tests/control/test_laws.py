@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 import cdsm
 from cdsm import control
-from cdsm.control import Measurement
+from cdsm.control import MotorMeasurement
 from cdsm.control.laws import INTEGRAL, LAWS, ControlInput, Reference
 from cdsm.support.values import Array
 
@@ -32,7 +32,7 @@ def inputs(draw: Callable[..., Array]) -> ControlInput:
     return ControlInput(
         reference=reference(),
         reference_before=reference(),
-        measurement=Measurement(draw(wires), draw(tensions)),
+        measurement=MotorMeasurement(draw(wires), draw(tensions)),
         error_before=draw(tensions),
         paid_out=draw(wires),
         minimum=low,
@@ -68,7 +68,7 @@ def test_wire_and_tension_of_a_command_agree(name: str, at: ControlInput) -> Non
 def held(error: float, *, controlled: bool = True) -> ControlInput:
     """A cable that stands still, with ``error`` [N] missing to its wanted 50 N."""
     wanted = Reference(np.zeros(1), np.array([50.0]), np.array([0.4]), np.array([2e4]))
-    measured = Measurement(np.array([0.41]), np.array([50.0 - error]))
+    measured = MotorMeasurement(np.array([0.41]), np.array([50.0 - error]))
     bounds = np.array([10.0]), np.array([200.0])
     missing, mask = np.array([error]), np.array([controlled])
     return ControlInput(wanted, wanted, measured, missing, measured.paid_out, *bounds, mask)
@@ -108,7 +108,7 @@ def test_wire_and_tension_of_one_cable_are_those_by_hand(
     assert command.saturated.all() == command.saturated.any() == saturated
 
 
-TRUTH = [Measurement(np.full(3, 0.1234567 * k), np.full(3, 50.0 + k)) for k in (1, 2, 3)]
+TRUTH = [MotorMeasurement(np.full(3, 0.1234567 * k), np.full(3, 50.0 + k)) for k in (1, 2, 3)]
 
 
 def test_sensors_count_err_and_are_late_as_they_say() -> None:

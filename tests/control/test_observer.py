@@ -6,11 +6,11 @@ import pytest
 import cdsm
 from cdsm.control import with_rigidity
 from cdsm.control.laws import Command
-from cdsm.control.plants import QuasiStaticState
+from cdsm.control.plants import QuasiStaticPlantState
 from cdsm.control.sensing import Estimate, Observer
 from tests.support.tracking import paid_out, small_path
 
-Pairs = list[tuple[QuasiStaticState, Estimate]]
+Pairs = list[tuple[QuasiStaticPlantState, Estimate]]
 
 NONE = np.zeros(6)
 EXACT = cdsm.Sensors(encoder=0.0)
