@@ -11,8 +11,11 @@ from cdsm.arm_parameters import ArmParameters as ArmParameters
 from cdsm.batch import distribute_tensions as distribute_tensions
 from cdsm.batch import evaluate as evaluate
 from cdsm.cable import Cable as Cable
-from cdsm.cable import Site as Site
 from cdsm.cable import serpentine_cables as serpentine_cables
+from cdsm.cable_path import JointPulley as JointPulley
+from cdsm.cable_path import Pulley as Pulley
+from cdsm.cable_path import Sheath as Sheath
+from cdsm.cable_path import Site as Site
 from cdsm.control.plants import MuJoCoPlant as MuJoCoPlant
 from cdsm.control.plants import QuasiStaticPlant as QuasiStaticPlant
 from cdsm.control.sensing import Sensors as Sensors

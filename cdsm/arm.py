@@ -25,6 +25,7 @@ from cdsm.support.format import JointUnits, plural
 from cdsm.support.validation import flag, vector
 from cdsm.support.values import Array, Printed, frozen
 from cdsm.tolerances import Tolerances
+from cdsm.wraps import Wraps, placed
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -39,13 +40,15 @@ class ComputedArm(Printed):
         springs: Springs at the joints: ``springs.stiffness`` k (n,) [N m/rad] and
             ``springs.angle`` q_0 (n,) [rad], at which they have no torque; of all n joints, also
             those that follow others.
-        routing: Sites and segments of the cables.
+        wraps: Cables over pulleys; None: there are none.
+        routing: Sites and segments of the cables; contacts with all pulleys, if there are any.
         laws: Elasticities of the cables.
     """
 
     definition: ArmDefinition
     body: RigidBody = field(compare=False)
     springs: Springs = field(compare=False)
+    wraps: Wraps | None = field(compare=False)
     routing: Routing = field(compare=False)
     laws: CableLaws = field(compare=False)
 
@@ -66,11 +69,14 @@ class ComputedArm(Printed):
             names = definition.joint_names
             body = RigidBody(definition.urdf, definition.tip_link, gravity, names)
         springs, changed = _springs(definition, body)
-        named = replace(definition, joint_names=body.joint_names, springs=changed)
-        routing = Routing.of(body, named.cables)
-        laws = CableLaws(named.cables)
+        cables = placed(body, definition.cables)
+        named = replace(definition, cables=cables, joint_names=body.joint_names, springs=changed)
+        wraps = Wraps.of(body, cables) if any(cable.pulleys for cable in cables) else None
+        routing = wraps.all_touching.routing if wraps else Routing.of(body, cables)
+        laws = CableLaws(cables)
         # once; from here on the arm is frozen
         vars(self).update(definition=named, body=body, springs=springs, routing=routing, laws=laws)
+        vars(self).update(wraps=wraps)
         for doubt in self._doubts:
             if like is None or doubt not in like._doubts:
                 warn(f"{self.name}: {doubt}")
@@ -78,7 +84,8 @@ class ComputedArm(Printed):
 
     @cached_property
     def _doubts(self) -> tuple[str, ...]:
-        return self.definition.doubts(self.body)
+        doubts = self.definition.doubts(self.body)
+        return doubts if self.wraps is None else (*doubts, *self.wraps.doubts)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self).of, (self.definition,)

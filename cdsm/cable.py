@@ -1,29 +1,29 @@
-"""Cables that run straight from site to site of the links, and those of a serpentine arm."""
+"""Cables through sites and over pulleys of the links, and those of a serpentine arm."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import Any, Final, Literal, SupportsIndex, final, get_args, overload
+from typing import Final, Literal, SupportsIndex, final, get_args, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cdsm.cable_path import PathElement, Pulley, Sheath, Site, checked_path
 from cdsm.errors import CdsmError, InvalidInput, listed
 from cdsm.geometry import Geometry
 from cdsm.support.format import plural
 from cdsm.support.validation import (
-    checked_quantity,
+    check_numbers,
     instance,
+    number,
     number_array,
     one_of,
     scalar,
-    sequence_of,
     text,
-    vector,
 )
 from cdsm.support.values import Array
 from cdsm.wires.catalogue import label
@@ -32,51 +32,10 @@ from cdsm.wires.elasticity import Elasticity, checked_law
 Control = Literal["position", "force"]
 
 
-def number(kind: str, default: float, *, zero: bool = False, infinite: bool = False) -> Any:
-    """Declare a number of a dataclass that :func:`check_numbers` checks against its range."""
-    return field(default=default, metadata={"range": (kind, zero, infinite)})
-
-
-def check_numbers(value: object) -> None:
-    """Check all fields of a frozen dataclass that :func:`number` declares; InvalidInput."""
-    for attribute in fields(value):  # type: ignore[arg-type]
-        name = attribute.name
-        if "range" in attribute.metadata:
-            kind, zero, infinite = attribute.metadata["range"]
-            size = checked_quantity(name, getattr(value, name), kind, zero=zero, infinite=infinite)
-            value.__dict__[name] = size
-
-
-@final
-@dataclass(frozen=True)
-class Site:
-    """A point fixed to a link, through which a cable passes or at which it ends.
-
-    Attributes:
-        link: Name of the link in the URDF.
-        position: Position in the link's frame [m].
-        friction: Coulomb friction coefficient μ [-] between cable and hole, 0 to 2.
-        wrap: Wrap angle [rad] beyond that between the two segments, e.g. of a curved tube, 0 to 4π.
-
-    Raises InvalidInput if an attribute is anything else.
-    """
-
-    link: str
-    position: tuple[float, float, float]
-    friction: float = number("friction", 0.0, zero=True)
-    wrap: float = number("wrap", 0.0, zero=True)
-
-    def __post_init__(self) -> None:
-        text("link", self.link)
-        position = vector("position", self.position, 3, f"a point on {self.link} [m]", "length")
-        check_numbers(self)
-        self.__dict__["position"] = tuple(position.tolist())
-
-
 @final
 @dataclass(frozen=True)
 class Cable:
-    """A cable through an ordered list of sites, actuator side first.
+    """A cable through an ordered list of sites and pulleys, actuator side first.
 
     Its length L is ``lead`` plus the straight segments between sites; the lead must be long enough
     for the series spring. The original length of the wire is l_0 = (L − ΔF/k_series)/(1 + ε(F)),
@@ -84,11 +43,13 @@ class Cable:
     k = 1/(l_0/EA(F) + 1/k_series), and 0 if the motor controls force.
 
     The cable ends at its last site and passes all others, which are holes. The lead is parallel to
-    x of the first site's link. Without a lead, the first site is the actuator, not a hole.
+    x of the first site's link. Without a lead, the first site is the actuator, not a hole. Between
+    sites the cable runs straight, or around pulleys, with their arcs in L, or through a sheath.
 
     Attributes:
         name: Unique name within an arm.
-        sites: Two or more, from the actuator to the end of the cable.
+        sites: Two or more sites, from the actuator to the end of the cable, with the pulleys and
+            sheaths between them (:class:`Site`, :class:`Pulley`, :class:`Sheath`).
         elasticity: Law EA(F).
         lead: Straight cable between the actuator and the first site [m].
         series_stiffness: k_series of a spring (Fig. 11) or drive in series [N/m]; inf: none.
@@ -105,7 +66,7 @@ class Cable:
     """
 
     name: str
-    sites: tuple[Site, ...]
+    sites: tuple[PathElement, ...]
     elasticity: Elasticity
     lead: float = number("length", 0.0, zero=True)
     # what follows are keys of ARM.toml, for all cables or for one
@@ -120,11 +81,9 @@ class Cable:
         try:
             text("name", self.name)
             checked_law(self.elasticity)
-            sites = sequence_of("sites", self.sites, Site)
             one_of("control", self.control, get_args(Control))
             check_numbers(self)
-            if len(sites) < 2:
-                raise CdsmError(f"sites: {len(sites)} given; two or more Site are needed.")
+            sites = checked_path(self.sites, self.lead)
             if self.minimum > self.maximum:
                 bounds = f"tensions from {self.minimum:g} to {self.maximum:g} N"
                 raise CdsmError(f"{bounds}; give minimum <= maximum.")
@@ -132,7 +91,8 @@ class Cable:
             raise InvalidInput(f"cable {self.name!r}", str(error)) from None
         self.__dict__["sites"] = sites
         for i in {0, len(sites) - 1}.difference(self._holes):
-            if sites[i].friction or sites[i].wrap:
+            end = sites[i]
+            if isinstance(end, Site) and (end.friction or end.wrap):
                 why = "ends there; only" if i else "starts there. Give a lead; only"
                 problem = f"site {i + 1} has friction or wrap, but the cable {why} holes have them."
                 raise InvalidInput(f"cable {self.name!r}", problem)
@@ -143,14 +103,58 @@ class Cable:
 
     @property
     def friction(self) -> tuple[float, ...]:
-        """Friction coefficient μ [-] of each hole that the cable passes, actuator side first."""
-        return tuple(self.sites[i].friction for i in self._holes)
+        """Friction coefficient μ [-] of all that the cable passes, actuator side first.
+
+        These are holes, pulleys and sheaths; of a pulley on a bearing, :attr:`Pulley.bearing`.
+        """
+        passed = [self.sites[i] for i in self._holes]
+        if isinstance(self.sites[0], Sheath):
+            passed.insert(0, self.sites[0])
+        return tuple(
+            element.friction or (element.bearing if isinstance(element, Pulley) else 0.0)
+            for element in passed
+        )
+
+    def only_sites(self, lacks: str) -> tuple[Site, ...]:
+        """Return a path that is made of sites alone.
+
+        InvalidInput if it has pulleys or sheaths: ``lacks`` says what cannot handle them.
+        """
+        for element in self.sites:
+            if not isinstance(element, Site):
+                what = "through a sheath"
+                if isinstance(element, Pulley):
+                    what = f"over the pulley on {element.link}"
+                raise InvalidInput(f"cable {self.name!r}", f"runs {what}, and {lacks}")
+        return tuple(element for element in self.sites if isinstance(element, Site))
+
+    @property
+    def guided(self) -> float:
+        """Length [m] that no joint changes: the lead, and the sheaths of the path."""
+        sheaths = (element.length for element in self.sites if isinstance(element, Sheath))
+        return sum(sheaths, self.lead)
+
+    @property
+    def pulleys(self) -> tuple[Pulley, ...]:
+        """Pulleys of the path, actuator side first."""
+        return tuple(element for element in self.sites if isinstance(element, Pulley))
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the cable runs through sites alone, over no pulley and through no sheath."""
+        return all(isinstance(element, Site) for element in self.sites)
 
     def with_friction(self, friction: float) -> Cable:
-        """Return the same cable with μ = ``friction`` (0 to 2) in all holes that it passes."""
+        """Return the same cable with μ = ``friction`` (0 to 2) in all holes that it passes.
+
+        Pulleys and sheaths keep theirs.
+        """
         sites = self.sites
         holes = self._holes
-        rough = [replace(sites[i], friction=friction) for i in holes]
+        rough = [
+            replace(site, friction=friction) if isinstance(site, Site) else site
+            for site in sites[holes.start : holes.stop]
+        ]
         return replace(self, sites=(*sites[: holes.start], *rough, *sites[holes.stop :]))
 
     def elongation(self, tension: ArrayLike, free_length: float) -> Array:
@@ -263,12 +267,14 @@ def holes_like(cable: Cable, other: Cable) -> tuple[Site, ...]:
 
     A hole that only ``cable`` passes gets the friction of the nearest hole that ``other`` passes.
     """
-    sites = list(cable.sites)
+    lacks = "a geometry has none to vary."
+    sites = list(cable.only_sites(lacks))
+    theirs = other.only_sites(lacks)
     known = other._holes
     for i in cable._holes if known else ():
         near = min(max(i, known[0]), known[-1])
-        wrap = other.sites[near].wrap if i == near else 0.0
-        sites[i] = replace(sites[i], friction=other.sites[near].friction, wrap=wrap)
+        wrap = theirs[near].wrap if i == near else 0.0
+        sites[i] = replace(sites[i], friction=theirs[near].friction, wrap=wrap)
     return tuple(sites)
 
 
@@ -291,8 +297,11 @@ def require_own_cables(geometry: Geometry, cables: Sequence[Cable]) -> None:
         )
 
 
-def _path(cable: Cable) -> tuple[float, list[tuple[str, tuple[float, ...]]]]:
-    return cable.lead, [(site.link, tuple(site.position)) for site in cable.sites]
+def _path(cable: Cable) -> tuple[float, list[object]]:
+    return cable.lead, [
+        (element.link, element.position) if isinstance(element, Site) else element
+        for element in cable.sites
+    ]
 
 
 def wires_text(cables: Sequence[Cable]) -> str:

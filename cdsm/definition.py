@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, final
 
 from cdsm.cable import Cable, Cables
+from cdsm.cable_path import positions
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry import Geometry
 from cdsm.joints import Spring
@@ -141,7 +142,7 @@ class ArmDefinition:
             sizes.append((f"the lead of {cable.name}", cable.lead, most))
             if length > 0.0:
                 sizes.append((f"the slack of {cable.name}", cable.slack, length))
-            far = max(math.hypot(*site.position) for site in cable.sites)
+            far = max(math.hypot(*element.position) for element in positions(cable.sites))
             sizes.append((f"a site of {cable.name}", far, most))
         largest = max(sizes, key=lambda size: size[1] / size[2])
         # a geometry warns of its own length

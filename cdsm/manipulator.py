@@ -207,22 +207,32 @@ class Manipulator(ComputedArm):
         q = self.checked_angles(q, check_limits)
         routing = self.routing
         state = self.body.state(q)
-        site = routing.sites(state.placement)
-        spans = routing.spans(state.twist, site)
-        self.require_apart(spans.length, q)
+        wrapping = self.wraps.at(state.twist, state.placement) if self.wraps else None
+        if wrapping is None:
+            site = routing.sites(state.placement)
+            spans = routing.spans(state.twist, site)
+            self.require_apart(spans.length, q)
+            lengths = routing.lengths(spans.length)
+            jacobian = routing.jacobian(spans)
+        else:
+            site = wrapping.node
+            spans = wrapping.spans
+            lengths = wrapping.lengths
+            jacobian = wrapping.jacobian
         return Posture(
             arm=self,
             q=q,
             tip=frozen(state.tip),
             jacobian=frozen(state.jacobian),
-            cable_lengths=frozen(routing.lengths(spans.length)),
-            length_jacobian=frozen(routing.jacobian(spans)),
+            cable_lengths=frozen(lengths),
+            length_jacobian=frozen(jacobian),
             gravity_torque=frozen(state.gravity_torque),
             gravity_stiffness=frozen(state.gravity_stiffness),
             twist=frozen(state.twist),
             placements=frozen(state.placement),
             sites=frozen(site),
             spans=spans,
+            wrapping=wrapping,
         )
 
     @cached_property

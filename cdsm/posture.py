@@ -11,12 +11,14 @@ import numpy as np
 
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry.parts import overlapping
-from cdsm.routing import Spans
+from cdsm.routing import Routing, Spans
 from cdsm.segments import Segments
 from cdsm.support.format import aligned, coordinates, merged, prepare_json
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, ReadOnlyState, draw, frozen
+from cdsm.wrap_table import WrapTable, wrap_table
+from cdsm.wraps import Wrapping
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,8 +45,9 @@ class Posture(ReadOnlyState):
         gravity_stiffness: ∂g/∂θ (nv, nv) [N m/rad]: H_H G_g of Eq. 16.
         twist: (v, z) (6, n) of all n joints: a point x that joint j moves has ∂x/∂θ_j = v + z × x.
         placements: Poses (n+1, 4, 4) of the base and of the joints' frames.
-        sites: Positions (3, P) [m] of the sites of all cables.
+        sites: Positions (3, P) [m] of the sites of all cables, and of their contacts with pulleys.
         spans: Segments of all cables, with their motions.
+        wrapping: Cables over pulleys; None for an arm without pulleys.
     """
 
     arm: Manipulator
@@ -59,6 +62,17 @@ class Posture(ReadOnlyState):
     placements: Array
     sites: Array
     spans: Spans
+    wrapping: Wrapping | None = None
+
+    @property
+    def routing(self) -> Routing:
+        """Cables as polylines through their sites and their contacts with pulleys."""
+        return self.wrapping.pattern.routing if self.wrapping else self.arm.routing
+
+    @cached_property
+    def wraps(self) -> WrapTable:
+        """Wrap angle, fleet angles and contacts of each cable on each pulley of its path."""
+        return wrap_table(self)
 
     def __repr__(self) -> str:
         return f"<Posture of {self.arm.name}, tip at {coordinates(1e3 * self.tip[:3, 3])} mm>"
@@ -88,14 +102,19 @@ class Posture(ReadOnlyState):
     @cached_property
     def length_hessian(self) -> Array:
         """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], computed on first use."""
-        routing = self.arm.routing
+        routing = self.routing
         one = np.ones(routing.cable.size)
         count = len(self.cable_lengths)
-        return frozen(routing.hessians(self.spans, one, routing.cable, count))
+        H = routing.hessians(self.spans, one, routing.cable, count)
+        if self.wrapping:
+            H = H + self.wrapping.shifts.hessians(routing.cable, count)
+        return frozen(H)
 
     @cached_property
     def cable_paths(self) -> tuple[Array, ...]:
         """Sites of each cable in base axes, one array (sites, 3) per cable [m]."""
+        if self.wrapping:
+            return self.wrapping.paths
         ends = np.cumsum([len(cable.sites) for cable in self.arm.cables])
         return tuple(frozen(path.copy()) for path in np.split(self.sites.T, ends[:-1]))
 
@@ -129,7 +148,7 @@ class Posture(ReadOnlyState):
     def stick_figure(self, without: Collection[int] = ()) -> tuple[list[Array], list[Array]]:
         """Return :attr:`bones` and :attr:`brackets`, except those of the rows in ``without``."""
         brackets = []
-        for row, site in zip(self.arm.routing.row.tolist(), self.sites.T, strict=True):
+        for row, site in zip(self.routing.row.tolist(), self.sites.T, strict=True):
             if row not in without:
                 feet = [foot(site, bone) for at, bone in self.bones_by_row if at == row]
                 ends = feet or [self.placements[row, :3, 3]]
@@ -157,9 +176,12 @@ class Posture(ReadOnlyState):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """One text, which names overlapping links, if the arm passes through itself; else none."""
+        """What is doubtful here: links that overlap, and cables about to leave their pulleys."""
+        remarks = self.wrapping.remarks if self.wrapping else ()
         pairs = [" and ".join(pair) for pair in self.self_contacts]
-        return (f"the arm passes through itself: {listed(pairs, 3, '; ')}",) if pairs else ()
+        if pairs:
+            remarks = (f"the arm passes through itself: {listed(pairs, 3, '; ')}", *remarks)
+        return remarks
 
     @cached_property
     def segments(self) -> Segments:

@@ -97,6 +97,8 @@ class RigidBody:
             if frame.type == pin.FrameType.BODY
         }
         self.link_names = tuple(self._frames)
+        joints = robot.iterfind("joint")
+        self._before = {joint.get("name"): joint.find("parent").get("link") for joint in joints}
         self._tip = self._frame(tip)
         self._scratch = threading.local()
         self.parent: list[int] = list(model.parents)
@@ -167,6 +169,19 @@ class RigidBody:
         frame = self._model.frames[self._frame(link)]
         place = frame.placement
         return int(frame.parentJoint), place.rotation.copy(), place.translation.copy()
+
+    def joint_axis(self, joint: str) -> tuple[str, Array, Array]:
+        """Return the link before a joint, and a point of the joint's axis and the axis (3,) there.
+
+        Raises InvalidInput if there is no such joint that turns.
+        """
+        turning = [n for n, t in zip(self.all_joints, self._twists[1:], strict=True) if t[3:].any()]
+        row = 1 + self.all_joints.index(one_of("joint", joint, turning))
+        place = self._model.jointPlacements[row]
+        link = self._before[joint]
+        _, rotation, translation = self.locate(link)
+        axis = place.rotation @ self._twists[row, 3:]
+        return link, rotation.T @ (place.translation - translation), rotation.T @ axis
 
     def joints_to(self, row: int) -> list[int]:
         """Return the rows of the joints from the base to the joint in ``row``, included."""

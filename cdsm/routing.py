@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
+from cdsm.cable_path import Pulley, Sheath, Site
 from cdsm.errors import InvalidInput
 from cdsm.joints import Coupling
 from cdsm.rigid_body import RigidBody
@@ -44,6 +45,27 @@ class Spans(NamedTuple):
     axis: Array  # ± z_i of the joints of each segment (3, S, m)
     motion: Array  # d_i (3, S, m)
     rate: Array  # ∂ℓ/∂θ_i (S, m)
+
+
+class Node(NamedTuple):
+    """A point of a cable on a link: a site, or a contact with a pulley."""
+
+    row: int  # row of the joint that moves the link; the base is 0
+    point: Array  # position in the frame of this joint (3,) [m]
+    moves: bool = False  # whether it moves on the link, as contacts do
+    linked: bool = True  # whether a straight segment leads to it from the node before
+
+
+def located(body: RigidBody, cable: str, element: Site | Pulley) -> tuple[int, Array]:
+    """Return the row of the joint that moves an entry of a cable, and its place in this frame [m].
+
+    Raises InvalidInput, which names the cable, for an unknown link.
+    """
+    try:
+        joint, rotation, translation = body.locate(element.link)
+    except InvalidInput as error:
+        raise InvalidInput(f"cable {cable!r}", str(error)) from None
+    return joint, translation + rotation @ np.array(element.position)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,29 +98,49 @@ class Routing:
 
     @classmethod
     def of(cls, body: RigidBody, cables: Sequence[Cable], *, every: bool = False) -> Self:
-        """Route cables over a body. With ``every``, segments within one body count as segments.
+        """Route cables through their sites; :mod:`cdsm.wraps` routes those over pulleys.
+
+        With ``every``, segments within one body count as segments.
 
         Raises InvalidInput for an unknown link, or if two neighbouring sites of a link coincide.
         """
+        paths = []
+        for cable in cables:
+            nodes: list[Node] = []
+            linked = True
+            for element in cable.sites:
+                if isinstance(element, Site):
+                    place = located(body, cable.name, element)
+                    nodes.append(Node(*place, linked=linked))
+                linked = not isinstance(element, Sheath)
+            paths.append(nodes)
+        return cls.through(body, cables, paths, every=every)
+
+    @classmethod
+    def through(
+        cls,
+        body: RigidBody,
+        cables: Sequence[Cable],
+        paths: Sequence[Sequence[Node]],
+        *,
+        every: bool = False,
+    ) -> Self:
+        """Route cables through the nodes of their paths; leads and sheaths are fixed lengths."""
         row: list[int] = []
         point: list[Array] = []
-        fixed = np.array([cable.lead for cable in cables])
+        fixed = np.array([cable.guided for cable in cables], dtype=np.float64)
         segments: list[tuple[int, int, list[tuple[int, float]]]] = []
-        for c, cable in enumerate(cables):
-            for i, site in enumerate(cable.sites):
-                try:
-                    joint, rotation, translation = body.locate(site.link)
-                except InvalidInput as error:
-                    raise InvalidInput(f"cable {cable.name!r}", str(error)) from None
-                row.append(joint)
-                point.append(translation + rotation @ np.array(site.position))
-                if i == 0:
+        for c, path in enumerate(paths):
+            for i, node in enumerate(path):
+                row.append(node.row)
+                point.append(node.point)
+                if i == 0 or not node.linked:
                     continue
-                if row[-2] == row[-1]:
+                if row[-2] == row[-1] and not (node.moves or path[i - 1].moves):
                     length = math.dist(point[-2], point[-1])
                     if length < SHORTEST_SEGMENT:
                         problem = f"sites {i} and {i + 1} coincide; leave one out."
-                        raise InvalidInput(f"cable {cable.name!r}", problem)
+                        raise InvalidInput(f"cable {cables[c].name!r}", problem)
                     if not every:
                         fixed[c] += length
                         continue
@@ -108,12 +150,12 @@ class Routing:
                 way += [(joint - 1, 1.0) for joint in to_b if joint not in to_a]
                 segments.append((c, len(row) - 1, way))
         longest = max((len(way) for *_, way in segments), default=0)
-        path = np.zeros((len(segments), longest), np.intp)
-        sign = np.zeros(path.shape)
+        sequence = np.zeros((len(segments), longest), np.intp)
+        sign = np.zeros(sequence.shape)
         for s, (*_, way) in enumerate(segments):
             for i, step in enumerate(way):
-                path[s, i], sign[s, i] = step
-        cable_of, end = (np.array([each[i] for each in segments], np.intp) for i in (0, 1))
+                sequence[s, i], sign[s, i] = step
+        cable_of, end = (np.array([segment[i] for segment in segments], np.intp) for i in (0, 1))
         return cls(
             joint_count=len(body.all_joints),
             row=frozen(np.array(row, np.intp)),
@@ -121,7 +163,7 @@ class Routing:
             cable=frozen(cable_of),
             first=frozen(end - 1),
             second=frozen(end),
-            path=frozen(path),
+            path=frozen(sequence),
             sign=frozen(sign),
             fixed=frozen(fixed),
             coupling=body.coupling,

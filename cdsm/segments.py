@@ -22,6 +22,8 @@ from cdsm.rigid_body import RigidBody
 from cdsm.routing import Indices, Routing, Spans, cross, dot
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
+_NO_PULLEYS = "friction knows no pulleys and sheaths yet."
+
 STRAIGHT = 1e-9
 """Wrap angle [rad] below which a cable counts as straight in a hole: the angle is rounding."""
 
@@ -63,7 +65,7 @@ class Chains:
         start = [0]
         holes = []
         for cable in cables:
-            sites = list(cable.sites)
+            sites = list(cable.only_sites(_NO_PULLEYS))
             if cable.lead > 0.0:
                 x, y, z = sites[0].position
                 sites.insert(0, replace(sites[0], position=(x - cable.lead, y, z)))

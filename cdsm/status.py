@@ -33,8 +33,9 @@ class Status(IntEnum):
     """All requested quantities exist."""
     BEYOND_LIMITS = 1, "a joint angle is beyond its limit"
     """A joint angle is beyond its limit (InvalidInput): no quantity exists."""
-    COINCIDENT_SITES = 2, "two neighbouring sites of a cable coincide"
-    """Two neighbouring sites of a cable coincide (InvalidInput): no quantity exists."""
+    COINCIDENT_SITES = 2, "two neighbouring sites coincide, or a cable cannot run over its pulley"
+    """Two neighbouring sites of a cable coincide, or one is inside a pulley or too far beside its
+    groove (InvalidInput): no quantity exists."""
     INFEASIBLE = 3, "no tensions within the bounds balance the arm"
     """No tensions within the bounds balance the arm (InfeasibleTension): only quantities of the
     joint angles alone exist."""

@@ -152,8 +152,11 @@ class ConstantPull:
 
     def stiffness(self, pose: Posture) -> Array:
         """Compute H_L·F (nv, nv) [N m/rad]."""
-        routing = pose.arm.routing
-        return np.asarray(routing.hessian(pose.spans, self.tension[routing.cable]))
+        weight = self.tension[pose.routing.cable]
+        H = np.asarray(pose.routing.hessian(pose.spans, weight))
+        if pose.wrapping:
+            H = H + pose.wrapping.shifts.hessian(weight)
+        return H
 
 
 @dataclass(slots=True)

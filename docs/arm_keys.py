@@ -17,12 +17,19 @@ def table() -> str:
     """Return the table as Markdown: where a key stands, the key, and what it means."""
     cable = attributes_of(cdsm.Cable)
     site = attributes_of(cdsm.Site)
+    pulley = attributes_of(cdsm.Pulley)
+    at_joint = attributes_of(cdsm.JointPulley)
+    sheath = attributes_of(cdsm.Sheath)
     rows = [
         *_rows("top", attributes_of(ArmFile)),
         *_rows("top, `[cables.NAME]`, `[[cables]]`", {key: cable[key] for key in SETTINGS}),
         *_rows("`[[cables]]`", {key: cable[key] for key in ("name", "lead", "sites")}),
         *_rows("`sites`", {"link": site["link"], "xyz": site["position"]}),
         *_rows("`sites`", {key: site[key] for key in ("friction", "wrap")}),
+        *_rows("`sites`, a pulley", {key: pulley[key] for key in ("radius", "axis", "groove")}),
+        *_rows("`sites`, a pulley", {key: pulley[key] for key in ("turns", "bearing")}),
+        *_rows("`sites`, a pulley at a joint", {key: at_joint[key] for key in ("joint", "turn")}),
+        *_rows("`sites`, a sheath", {"sheath": sheath["length"], "pieces": sheath["pieces"]}),
         *_rows("`[urdf]`", attributes_of(Urdf)),
         *_rows("`[universal]`, `[hinged]`", attributes_of(cdsm.Geometry.universal)),
         *_rows("`[hinged]`", {"twist": "Angle about x from each hinge axis to the next [rad]."}),

@@ -15,7 +15,9 @@ from textwrap import fill
 from typing import Any, Final
 
 from cdsm.arm_file.model import ArmFile, read_model
-from cdsm.cable import SETTINGS, Cable, Site, serpentine_cables
+from cdsm.arm_file.path_entries import entry_table
+from cdsm.cable import SETTINGS, Cable, serpentine_cables
+from cdsm.cable_path import Site
 from cdsm.definition import ArmDefinition, refuse_terms
 from cdsm.errors import FileError, GeometryError, InvalidInput
 from cdsm.support.described import attributes_of, in_plain_text
@@ -112,11 +114,7 @@ def _settings(cable: Cable) -> dict[str, Any]:
 
 def _routed(cable: Cable, settings: dict[str, Any]) -> dict[str, Any]:
     """Return the TOML table of a cable with its sites and the settings ``own``."""
-    sites = [
-        {"link": site.link, "xyz": site.position}
-        | {key: x for key in ("friction", "wrap") if (x := getattr(site, key))}
-        for site in cable.sites
-    ]
+    sites = [entry_table(element) for element in cable.sites]
     lead = {"lead": cable.lead} if cable.lead else {}
     return {"name": cable.name, **lead, **settings, "sites": one_line_each(sites)}
 

@@ -15,7 +15,8 @@ from typing import Annotated, Any, Final, TypeVar, cast, get_type_hints
 from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, WrapValidator
 from pydantic import ValidationInfo as Info
 
-from cdsm.cable import SETTINGS, Cable, Cables, Site, serpentine_cables
+from cdsm.arm_file.path_entries import Label, PathEntry
+from cdsm.cable import SETTINGS, Cable, Cables, serpentine_cables
 from cdsm.errors import LINES, FileError, GeometryError, listed, warn
 from cdsm.geometry import Geometry, toml
 from cdsm.rigid_body import GRAVITY
@@ -146,7 +147,6 @@ _Gravity = Annotated[
     Discriminator(records.one_or_each),
     AfterValidator(lambda value: gravity_vector("gravity", value)),
 ]
-_Label = Annotated[str, Field(min_length=1, max_length=200)]
 _Law = Annotated[Any, PlainValidator(from_table)]
 
 
@@ -176,28 +176,16 @@ class _Settings:
 
 
 @record
-class _Site:
-    link: _Label
-    xyz: records.Position
-    friction: records.FrictionCoefficient | None = None
-    wrap: records.Wrap = 0.0
-
-
-@record
 class _Routed(_Settings):
-    name: _Label
+    name: Label
     lead: records.LengthOrZero = 0.0
-    sites: Annotated[tuple[_Site, ...], Field(strict=False, min_length=2)]
+    sites: Annotated[tuple[PathEntry, ...], Field(strict=False, min_length=2)]
 
     def built(self, friction: float) -> Cable:
         """Return the cable; ``friction`` is that of holes without one of their own."""
         holes = range(0 if self.lead else 1, len(self.sites) - 1)
-        sites = [
-            Site(site.link, site.xyz, friction * (i in holes) if mu is None else mu, site.wrap)
-            for i, site in enumerate(self.sites)
-            for mu in [site.friction]
-        ]
-        return Cable(self.name, tuple(sites), _NO_WIRE, self.lead)
+        path = (entry.built(friction * (i in holes)) for i, entry in enumerate(self.sites))
+        return Cable(self.name, tuple[Any, ...](path), _NO_WIRE, self.lead)
 
 
 @record

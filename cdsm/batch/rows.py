@@ -86,8 +86,9 @@ _KERNELS = frozenset(("gravity", "springs"))  # terms of an arm that the kernels
 
 
 def without_kernel(arm: Manipulator) -> list[str]:
-    """Return the names of the terms of an arm that no kernel computes."""
-    return [term.name for term in arm.terms if term.name not in _KERNELS]
+    """Return the names of the terms, and of the parts, of an arm that no kernel computes."""
+    lacking = [term.name for term in arm.terms if term.name not in _KERNELS]
+    return [*lacking, "pulleys"] if arm.wraps else lacking
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.cable import Cable, Site
+from cdsm.cable import Cable
+from cdsm.cable_path import Site
 from cdsm.errors import FileError, InvalidInput, unknown
 from cdsm.manipulator import Manipulator
 from cdsm.rigid_body import GRAVITY

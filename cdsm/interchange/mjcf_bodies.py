@@ -22,6 +22,10 @@ _SITE, _STICK = 1e-3, 0.008  # radius [m] of a drawn hole; of a stick over the l
 _GHOST = {"contype": "0", "conaffinity": "0", "mass": "0"}  # drawn, without mass or contacts
 
 
+NO_PULLEYS = "the export to MuJoCo knows no pulleys and sheaths yet."
+"""What :meth:`Cable.only_sites` says of cables that are not exported."""
+
+
 def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float]) -> None:
     """Add the tree of links to ``root``.
 
@@ -55,7 +59,7 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
         sites = [
             (f"{cable.name}/{i}", site.position)
             for cable in arm.cables
-            for i, site in enumerate(cable.sites, start=1)
+            for i, site in enumerate(cable.only_sites(NO_PULLEYS), start=1)
             if site.link == name
         ]
         sites += [("tool0", (0.0, 0.0, 0.0))] if name == arm.tip_link else []

@@ -309,11 +309,13 @@ class Stiffness(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A line that says that the arm is UNSTABLE; empty for a stable arm.
+        """Lines that say that the arm is UNSTABLE, or a cable about to leave a pulley; else empty.
 
-        ``report().remedies`` are changes that would hold it.
+        ``report().remedies`` are changes that would hold an unstable arm.
         """
-        return () if self.is_stable else (verdict(self),)
+        unstable = () if self.is_stable else (verdict(self),)
+        wrapping = self.posture.wrapping
+        return (*unstable, *wrapping.remarks) if wrapping else unstable
 
     def report(self) -> Report:
         """Check this frictionless stiffness: is it right, balanced, stable, and how to read it."""

@@ -98,7 +98,7 @@ Name = Annotated[str, AfterValidator(_name)]
 
 ONE = "(one)"
 EACH = "(each)"
-"""Tags of pydantic: one value for all joints, or one for each joint. Faults do not print tags."""
+"""Tags of pydantic: one value for all joints, or one for each joint. Faults print no tags: (…)."""
 
 
 def one_or_each(value: object) -> str:
@@ -176,11 +176,16 @@ def _keys(kind: Any) -> set[str]:
     return {*hints}.union(*map(_keys, (*hints.values(), *get_args(kind))))
 
 
+def _is_tag(part: int | str) -> bool:
+    """Return whether a part of a place is a tag of pydantic, such as ONE; keys have no brackets."""
+    return isinstance(part, str) and part.startswith("(") and part.endswith(")")
+
+
 def _faults(error: ValidationError, kind: Any) -> list[str]:
     listed: list[str] = []
     for fault in error.errors():
         # joints[2].limit counts from 1 like the names of joints and cables
-        parts = (part for part in fault["loc"] if part not in (ONE, EACH, "[key]"))
+        parts = (part for part in fault["loc"] if not _is_tag(part) and part != "[key]")
         shown = (f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in parts)
         where = "".join(shown).lstrip(".")
         cause = fault.get("ctx", {}).get("error")

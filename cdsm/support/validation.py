@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import field, fields
 from typing import Any, Final, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -79,6 +80,21 @@ def checked_quantity(
     if problem := within(kind, number, zero=zero, infinite=infinite):
         raise InvalidInput(name, f"{problem}.")
     return number
+
+
+def number(kind: str, default: float, *, zero: bool = False, infinite: bool = False) -> Any:
+    """Declare a number of a dataclass that :func:`check_numbers` checks against its range."""
+    return field(default=default, metadata={"range": (kind, zero, infinite)})
+
+
+def check_numbers(value: object) -> None:
+    """Check all fields of a frozen dataclass that :func:`number` declares; InvalidInput."""
+    for attribute in fields(value):  # type: ignore[arg-type]
+        name = attribute.name
+        if "range" in attribute.metadata:
+            kind, zero, infinite = attribute.metadata["range"]
+            size = checked_quantity(name, getattr(value, name), kind, zero=zero, infinite=infinite)
+            value.__dict__[name] = size
 
 
 def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:

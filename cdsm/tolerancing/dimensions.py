@@ -20,6 +20,9 @@ from cdsm.support.values import Array
 Change = tuple[str, str, NDArray[np.intp], Array]
 """Source and name of an input; which numbers of the arm it changes, and how fast."""
 
+NO_PULLEYS = "tolerances know no errors of pulleys and sheaths yet."
+"""What :meth:`Cable.only_sites` says of cables that tolerances cannot vary."""
+
 _NEAR = 1e-9  # a site this near to a disk [m] is on the disk
 _STEP = 1e-3  # of differences, over the smallest offset of a disk
 
@@ -27,7 +30,7 @@ _STEP = 1e-3  # of differences, over the smallest offset of a disk
 def changes_of_holes(arm: Manipulator, sites: Sequence[str], start: int) -> Iterator[Change]:
     """Yield what moves holes in their disk; ``start`` is the place of the first site."""
     links = {disk.link for disk in arm.geometry.disks}
-    for p, own in enumerate(site for cable in arm.cables for site in cable.sites):
+    for p, own in enumerate(site for cable in arm.cables for site in cable.only_sites(NO_PULLEYS)):
         _, y, z = own.position
         if own.link in links and (radius := math.hypot(y, z)):
             at = start + 3 * p + np.array([1, 2])
@@ -107,7 +110,7 @@ def _numbers(
     places = dict[str, list[tuple[int, float]]]()
     for d, disk in enumerate(chain.disks):
         places.setdefault(disk.link, []).append((d, disk.x))
-    cable_sites = enumerate(site for cable in arm.cables for site in cable.sites)
+    cable_sites = enumerate(site for cable in arm.cables for site in cable.only_sites(NO_PULLEYS))
     near = [
         (p, d, x - site.position[0])
         for p, site in cable_sites

@@ -22,7 +22,12 @@ from cdsm.manipulator import Manipulator
 from cdsm.parameters import PARAMETERS
 from cdsm.support.values import Array
 from cdsm.tolerances import EVERY, Tolerance, Tolerances, sources
-from cdsm.tolerancing.dimensions import Change, changes_of_chain, changes_of_holes
+from cdsm.tolerancing.dimensions import (
+    NO_PULLEYS,
+    Change,
+    changes_of_chain,
+    changes_of_holes,
+)
 from cdsm.tolerancing.rebuilt import labels_of
 from cdsm.urdf import CROSS_MASS
 
@@ -58,6 +63,7 @@ class Inputs:
 
     def __init__(self, arm: Manipulator) -> None:
         cables = arm.cables
+        paths = [cable.only_sites(NO_PULLEYS) for cable in cables]
         table = tables_of(arm)
         self._arm = (arm.name, _LARGEST * arm.length)
         self._nominal = table.dimensions
@@ -67,13 +73,17 @@ class Inputs:
         every = *self._nominal[:-1], softness
         self._parts = np.cumsum([x.size for x in every[:-1]])
         self._numbers = np.concatenate([x.ravel() for x in every])
-        cable_of_site = np.repeat(range(len(cables)), [len(c.sites) for c in cables])
+        cable_of_site = np.repeat(range(len(cables)), [len(path) for path in paths])
         row = arm.routing.row
         self._first = np.flatnonzero(
             (cable_of_site[1:] == cable_of_site[:-1]) & (row[1:] == row[:-1])
         )
         self._of_cable = np.eye(len(cables))[cable_of_site[self._first]]
-        holes = [(c.name, i, site) for c in cables for i, site in enumerate(c.sites, 1)]
+        holes = [
+            (cable.name, i, site)
+            for cable, path in zip(cables, paths, strict=True)
+            for i, site in enumerate(path, 1)
+        ]
         sites = [f"{name} on {site.link}, site {i}" for name, i, site in holes]
         slides = list(compress(arm.joint_names, arm.slides))
         self.labels: dict[str, Sequence[str]] = {

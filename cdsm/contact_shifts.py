@@ -1,0 +1,325 @@
+"""How contacts of cables with pulleys shift on their links, and what this adds to H_L.
+
+A contact that were a hole would be held. On a pulley it slips along the cable, which changes
+nothing, and it shifts sideways: up the flank of a groove, or along the axis of a smooth cylinder.
+:class:`~cdsm.routing.Routing` has the Hessian with held contacts; here is the rest.
+
+A free piece runs from A to B, with the length ℓ and the direction u. Seen from A, a joint moves B's
+contact by d and turns the piece by w = z × u. At a contact, n is the outward normal, b = n × u, and
+sin γ = a·u.
+
+**Grooves.** As γ grows the contact moves out along n, and as the piece turns it moves along b. The
+piece turns by N D instead of (1 − uuᵀ) d/ℓ:
+
+    N = (ℓ 1 + K_A + K_B)⁻¹ − uuᵀ/ℓ,   D = d + K_B w,
+    K_A = κ S,   K_B = −κ S,   S = n bᵀ + b nᵀ,   κ = r sin γ/cos² γ,
+
+each K with the pulley of its own end, and 0 if that end is no groove. The piece adds
+
+    ∂²ℓ = Dᵀ N D − wᵀ K_B w   in place of   dᵀ (1 − uuᵀ) d/ℓ.
+
+**Smooth cylinders.** Unrolled, the cable stays one straight line. Its contacts shift along b, the
+first by η and the last by η + s σ, with the wrapped length s and the change σ of the helix angle:
+
+    η − ℓ₁ σ = −ℓ₁ C₁,   C₁ = b₁·(N D − w),    η + (s + ℓ₂) σ = −ℓ₂ C₂,   C₂ = −b₂·N D.
+
+C are the rates of the kinks that held contacts would get. Smooth neighbours shift each other, so a
+chain is one linear system. It adds Σ C η over the contacts. Nothing is divided by s or ℓ, so that
+a cable that is about to lift off (s = 0) is an ordinary case.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.routing import Indices, Routing, Spans, cross, dot
+from cdsm.support.values import Array
+
+_IN_PLANE = 1e-12  # sine of γ, and kink per radian, that are rounding
+
+
+class Ends(NamedTuple):
+    """Free pieces at the 2 T contacts, T on arrival and then T on departure; none on a rim."""
+
+    segment: Indices  # segments of the routing that are free pieces at pulleys (G,)
+    piece: Indices  # of each contact, among the G (2T,)
+    free: NDArray[np.bool_]  # whether there is one (2T,)
+    way: Array  # −1 on arrival, where the contact is B of its piece; +1 on departure (2T,)
+    before: Indices  # the touching pulley right before each (T,); −1: a site
+    entries: tuple[Indices, Indices, Indices]  # joints of the pieces: piece, place in path, joint
+
+    @classmethod
+    def of(cls, routing: Routing, piece_in: Indices, piece_out: Indices, before: Indices) -> Self:
+        """Describe the segments that arrive and depart (T,) each; −1: the cable ends on the rim."""
+        both = np.concatenate([piece_in, piece_out])
+        free = both >= 0
+        segment = np.unique(both[free])
+        g, m = np.nonzero(routing.sign[segment])
+        return cls(
+            segment=segment,
+            piece=np.searchsorted(segment, np.where(free, both, 0)) % max(segment.size, 1),
+            free=free,
+            way=np.repeat([-1.0, 1.0], len(before)),
+            before=before,
+            entries=(g, m, routing.path[segment][g, m]),
+        )
+
+
+class _Contacts(NamedTuple):
+    """All 2 T contacts."""
+
+    normal: Array  # n (3, 2T)
+    across: Array  # b (3, 2T)
+    sine: Array  # sin γ (2T,)
+
+
+class _Pieces(NamedTuple):
+    """Motions of the G free pieces; all (3, G, nv) but N and K_B, (G, 3, 3)."""
+
+    length: Array  # ℓ (G,)
+    moved: Array  # d
+    turned: Array  # w
+    effective: Array  # D
+    compliance: Array  # N
+    flank: Array | None  # K_B; None: no cable climbs a flank
+    turn: Array  # N D
+
+
+class _Slips(NamedTuple):
+    """Shifts along smooth cylinders; 0 in grooves."""
+
+    kink: Array  # C (2T, nv)
+    shift: Array  # η and η + s σ (2T, nv)
+    tilt: Array  # σ (T, nv)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Shifts:
+    """Contacts of the T pulleys that cables touch, at a posture.
+
+    Attributes:
+        routing: Cables through sites and contacts.
+        spans: Their segments.
+        ends: The free pieces at the contacts.
+        radial: From the centres to the contacts (3, 2T) [m].
+        axis: a (3, T).
+        radius: r (T,) [m].
+        groove: Whether each has a groove (T,).
+        arc: Wrapped length s (T,) [m].
+        angle: Wrap angle Φ (T,) [rad].
+        slope: tan γ of the helix (T,).
+    """
+
+    routing: Routing
+    spans: Spans
+    ends: Ends
+    radial: Array
+    axis: Array
+    radius: Array
+    groove: NDArray[np.bool_]
+    arc: Array
+    angle: Array
+    slope: Array
+
+    @cached_property
+    def _contacts(self) -> _Contacts:
+        axis = np.concatenate([self.axis, self.axis], axis=1)
+        out = self.radial - dot(axis, self.radial) * axis
+        normal = out / np.sqrt(dot(out, out))
+        return _Contacts(normal, cross(normal, self._direction), self._sine)
+
+    @cached_property
+    def _direction(self) -> Array:
+        """Directions u of the free pieces at the contacts (3, 2T); 0 where there is none."""
+        direction = self.spans.direction[:, self.ends.segment[self.ends.piece]]
+        return np.asarray(direction * self.ends.free)
+
+    @cached_property
+    def _sine(self) -> Array:
+        axis = np.concatenate([self.axis, self.axis], axis=1)
+        return dot(axis, self._direction)
+
+    @property
+    def fleet(self) -> Array:
+        """Angle γ of each free piece to the plane of the pulley (2T,) [rad]; NaN on a rim."""
+        return np.where(self.ends.free, np.arcsin(np.clip(self._sine, -1.0, 1.0)), np.nan)
+
+    @cached_property
+    def _climb(self) -> Array | None:
+        """κ with its sign (2T,) [m] where cables leave a groove; None: all in their planes."""
+        held = np.concatenate([self.groove, self.groove])
+        sine = np.where(held, self._sine, 0.0)
+        if abs(sine).max(initial=0.0) <= _IN_PLANE:
+            return None
+        radius = np.concatenate([self.radius, self.radius])
+        return np.asarray(self.ends.way * radius * sine / (1.0 - sine * sine))
+
+    @cached_property
+    def _pieces(self) -> _Pieces:
+        ends = self.ends
+        spans = self.spans
+        length = spans.length[ends.segment]
+        u = spans.direction[:, ends.segment]
+        # one column for each joint
+        moved, turned = np.zeros((2, 3, ends.segment.size, self.routing.joint_count))
+        g, m, joint = ends.entries
+        moved[:, g, joint] = spans.motion[:, ends.segment[g], m]
+        turned[:, g, joint] = cross(spans.axis[:, ends.segment[g], m], u[:, g])
+        if self.routing.coupling:
+            moved = self.routing.reduced(moved)
+            turned = self.routing.reduced(turned)
+        # N = (1 − uuᵀ)/ℓ, or with the flanks of the grooves at both ends
+        scale = length[:, None, None]
+        uu = u.T[:, :, None] * u.T[:, None]
+        if self._climb is None:
+            compliance = (np.eye(3) - uu) / scale
+            turn = _apply(compliance, moved)
+            return _Pieces(length, moved, turned, moved, compliance, None, turn)
+        normal, across, _ = self._contacts
+        nb = normal.T[:, :, None] * (self._climb * across).T[:, None]
+        flanks = np.zeros((2, ends.segment.size, 3, 3))
+        T = len(self.radius)
+        for side, flank in zip((slice(T), slice(T, None)), flanks, strict=True):
+            some = ends.free[side]
+            flank[ends.piece[side][some]] = (nb + nb.transpose(0, 2, 1))[side][some]
+        at_b, at_a = flanks
+        compliance = np.linalg.inv(scale * np.eye(3) + at_a + at_b) - uu / scale
+        effective = moved + _apply(at_b, turned)
+        turn = _apply(compliance, effective)
+        return _Pieces(length, moved, turned, effective, compliance, at_b, turn)
+
+    @cached_property
+    def _slips(self) -> _Slips | None:
+        """Shifts along smooth cylinders; None: there are none, or they do not shift."""
+        if self.groove.all():
+            return None
+        ends = self.ends
+        T = len(self.radius)
+        smooth = ends.free & ~np.concatenate([self.groove, self.groove])
+        # C₁ = b·(N D − w) on arrival, C₂ = −b·N D on departure
+        rate = self._pieces.turn[:, ends.piece]
+        rate[:, :T] -= self._pieces.turned[:, ends.piece[:T]]
+        kink = dot(self._contacts.across[:, :, None], rate) * (-ends.way * smooth)[:, None]
+        if abs(kink).max() <= _IN_PLANE:
+            return None
+        first, tilt = self._unrolled(kink)
+        last = first + self.arc[:, None] * tilt
+        return _Slips(kink, np.concatenate([first, last]), tilt)
+
+    def _unrolled(self, kink: Array) -> tuple[Array, Array]:
+        """Solve for η and σ (T, nv): on the unrolled surface the cable stays straight."""
+        ends = self.ends
+        T = len(self.radius)
+        across = self._contacts.across
+        N = self._pieces.compliance[ends.piece]
+        length = self._pieces.length[ends.piece] * ends.free
+        # ℓ bᵀ N b: 1, but for a groove at the other end of the piece; 1 on the rim
+        own = np.where(ends.free, length * _form(across, N, across), 1.0)
+        i = np.arange(T)
+        M = np.zeros((2 * T, 2 * T))
+        M[i, i] = own[:T]
+        M[i, T + i] = -length[:T]
+        M[T + i, i] = own[T:]
+        M[T + i, T + i] = own[T:] * self.arc + length[T:]
+        # neighbours share a piece, and each sees the other's contact shift
+        j = np.flatnonzero(ends.before >= 0)
+        k = ends.before[j]
+        shared = length[j] * _form(across[:, T + k], N[j], across[:, j])
+        M[j, k] -= shared
+        M[j, T + k] -= shared * self.arc[k]
+        M[T + k, j] -= shared
+        # nothing shifts in a groove
+        held = np.flatnonzero(np.concatenate([self.groove, self.groove]))
+        M[held] = 0.0
+        M[held, held] = 1.0
+        shifts = np.asarray(np.linalg.solve(M, -length[:, None] * kink), np.float64)
+        return shifts[:T], shifts[T:]
+
+    @cached_property
+    def _added(self) -> Array | None:
+        """What each piece adds to ∂²ℓ with held contacts (G, nv, nv) [m/rad²]; None: nothing.
+
+        Only the sum over the pieces of a cable is symmetric.
+        """
+        if self._climb is None and self._slips is None:
+            return None
+        x = self._pieces
+        G, n = x.moved.shape[1:]
+        added = np.zeros((G, n, n))
+        if x.flank is not None:
+            u = self.spans.direction[:, self.ends.segment, None]
+            held = x.moved - dot(u, x.moved) * u
+            added += _products(x.effective, x.turn)
+            added -= _products(held, held / x.length[:, None])
+            added -= _products(x.turned, _apply(x.flank, x.turned))
+        if self._slips is not None:
+            work = self._slips.kink[:, :, None] * self._slips.shift[:, None]
+            np.add.at(added, self.ends.piece, work)
+        return added
+
+    def hessian(self, weight: Array) -> Array | float:
+        """Compute what shifts add to Σ weight_s ∂²ℓ_s (nv, nv), weights (S,); 0: nothing."""
+        if self._added is None:
+            return 0.0
+        H = np.tensordot(weight[self.ends.segment], self._added, 1)
+        return np.asarray(0.5 * (H + H.T))
+
+    def hessians(self, group: Indices, count: int) -> Array | float:
+        """Compute what shifts add to Σ ∂²ℓ_s of each of ``count`` groups of segments (S,)."""
+        if self._added is None:
+            return 0.0
+        H = np.zeros((count, *self._added.shape[1:]))
+        np.add.at(H, group[self.ends.segment], self._added)
+        return np.asarray(0.5 * (H + H.transpose(0, 2, 1)))
+
+    @cached_property
+    def wrap(self) -> tuple[Array, Array]:
+        """Angle β (T,) [rad] by which the cable turns on each pulley, and ∂β/∂θ (T, nv).
+
+        β = Φ in a groove, Φ cos γ on a helix. With the rate ∂u of the direction of a free piece,
+        seen from the pulley,
+
+            ∂β/∂θ = n·∂u/cos γ on arrival minus on departure;
+
+        on a helix times cos γ, and −Φ sin γ σ more.
+        """
+        x = self._pieces
+        ends = self.ends
+        T = len(self.radius)
+        normal, across, sine = self._contacts
+        turn = x.turn
+        if self._slips is not None:
+            # the contact at B moves by η b, the one at A by (η + s σ) b the other way
+            moved = across[:, :, None] * (self._slips.shift * -ends.way[:, None])[None]
+            shift = np.zeros_like(turn)
+            np.add.at(shift.transpose(1, 0, 2), ends.piece, moved.transpose(1, 0, 2))
+            turn = turn + _apply(x.compliance, shift)
+        rate = turn[:, ends.piece]
+        rate[:, :T] -= x.turned[:, ends.piece[:T]]
+        about = dot(normal[:, :, None], rate)
+        about *= (ends.free / np.sqrt(1.0 - sine * sine))[:, None]
+        cosine = 1.0 / np.sqrt(1.0 + self.slope**2)
+        gradient = cosine[:, None] * (about[:T] - about[T:])
+        if self._slips is not None:
+            gradient -= (self.angle * self.slope * cosine)[:, None] * self._slips.tilt
+        return np.asarray(self.angle * cosine), np.asarray(gradient)
+
+
+def _apply(matrix: Array, columns: Array) -> Array:
+    """Multiply matrices (G, 3, 3) by columns (3, G, n)."""
+    return np.asarray((matrix @ columns.transpose(1, 0, 2)).transpose(1, 0, 2))
+
+
+def _products(a: Array, b: Array) -> Array:
+    """Multiply the columns (3, G, n) of a and b: (G, n, n)."""
+    return np.asarray(a.transpose(1, 2, 0) @ b.transpose(1, 0, 2))
+
+
+def _form(a: Array, matrix: Array, b: Array) -> Array:
+    """Compute aᵀ M b (T,) for vectors (3, T) and matrices (T, 3, 3)."""
+    return np.asarray(np.einsum("xt,txy,yt->t", a, matrix, b))
