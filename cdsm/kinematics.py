@@ -104,18 +104,18 @@ class KinematicSolution(Result):
     def __str__(self) -> str:
         arm = self.posture.arm
         rows = [
-            (name, place(q, of), "at limit" if name in self.at_limit else "")
-            for name, q, of in zip(arm.joint_names, self.angles, arm.joint_units, strict=True)
+            (name, place(q, unit), "at limit" if name in self.at_limit else "")
+            for name, q, unit in zip(arm.joint_names, self.angles, arm.joint_units, strict=True)
         ]
         if self.of == "lengths":
             c = int(abs(self.length_error).argmax())
-            said = f"{arm.cables[c].name} is off most, by {1e3 * self.length_error[c]:+.2g} mm"
+            problem = f"{arm.cables[c].name} is off most, by {1e3 * self.length_error[c]:+.2g} mm"
         else:
-            said = f"the tip is {1e3 * self.position_error:.2g} mm off its target"
+            problem = f"the tip is {1e3 * self.position_error:.2g} mm off its target"
             turned = math.degrees(self.orientation_error)
-            said += f" and turned by {turned:.2g}°" if self.of == "pose" else ""
+            problem += f" and turned by {turned:.2g}°" if self.of == "pose" else ""
         verdict = "reachable" if self.reachable else "NOT REACHABLE"
-        return "\n".join([*aligned([("joint", "angle", ""), *rows]), "", f"{verdict}: {said}"])
+        return "\n".join([*aligned([("joint", "angle", ""), *rows]), "", f"{verdict}: {problem}"])
 
 
 def inverse_kinematics(
@@ -183,7 +183,7 @@ def solve_joint_angles(
 
 
 def _solve(
-    arm: Manipulator, of: _Kind, target: Array, guess: ArrayLike | None, tolerance: float
+    arm: Manipulator, kind: _Kind, target: Array, guess: ArrayLike | None, tolerance: float
 ) -> KinematicSolution:
     near = frozen(np.zeros(instance("arm", arm, Manipulator).nv))
     if guess is not None:
@@ -194,7 +194,7 @@ def _solve(
             raise InvalidInput("guess", f"{problem}; guess angles within the joint limits.")
     if not 0.0 < (tolerance := scalar("tolerance", tolerance)) < 1.0:
         raise InvalidInput("tolerance", f"{tolerance:g} given; a number between 0 and 1 is needed.")
-    search = partial(nearest, partial(_residual, arm, of, target), near, tolerance)
+    search = partial(nearest, partial(_residual, arm, kind, target), near, tolerance)
     lower = arm.lower  # a joint may be locked
     upper = np.maximum(arm.upper, arm.lower + 1e-12)
     try:
@@ -205,19 +205,19 @@ def _solve(
         # disks touch at a limit, so a cable has no direction there
         margin = _TOUCHING * range_of(lower, upper)
         pose = arm.at(search(lower + margin, upper - margin))
-    return KinematicSolution(posture=pose, of=of, target=target, guess=near, tolerance=tolerance)
+    return KinematicSolution(posture=pose, of=kind, target=target, guess=near, tolerance=tolerance)
 
 
-def _residual(arm: Manipulator, of: _Kind, target: Array, q: Array) -> _Pair:
+def _residual(arm: Manipulator, kind: _Kind, target: Array, q: Array) -> _Pair:
     """Compute r (m,) and ∂r/∂q (m, nv) at q (nv,)."""
-    if of == "lengths":
+    if kind == "lengths":
         pose = arm.at(q, check_limits=False)
         return (pose.cable_lengths - target) / arm.length, pose.length_jacobian / arm.length
     tip, jacobian = arm.body.tip(q)
     linear = jacobian[:3] / arm.length
-    wanted = target if of == "position" else target[:3, 3]
+    wanted = target if kind == "position" else target[:3, 3]
     offset = (tip[:3, 3] - wanted) / arm.length
-    if of == "position":
+    if kind == "position":
         return offset, linear
     turn, slope = rotation_vector(tip[:3, :3] @ target[:3, :3].T)
     return np.append(offset, turn), np.vstack([linear, slope @ jacobian[3:]])

@@ -123,8 +123,8 @@ def read_caspr(
 def _one_file(folder: Path, kind: str) -> Path:
     files = sorted(folder.glob(f"*_{kind}.xml"))
     if len(files) != 1:
-        found = ", ".join(file.name for file in files) or "none"
-        raise FileError(folder, f"holds {found} where one *_{kind}.xml is needed.")
+        names = ", ".join(file.name for file in files) or "none"
+        raise FileError(folder, f"holds {names} where one *_{kind}.xml is needed.")
     return files[0]
 
 
@@ -178,9 +178,9 @@ def _body(
     body = "physical/inertia"
     kind = element.find("joint")
     if kind is None or kind.get("type") not in _JOINTS:
-        given = None if kind is None else kind.get("type")
+        axis = None if kind is None else kind.get("type")
         known = ", ".join(_JOINTS)
-        raise XmlFault(f"{name}: the joint type {given!r} is not supported; {known} are")
+        raise XmlFault(f"{name}: the joint type {axis!r} is not supported; {known} are")
     mass = float(values("physical/mass", 1)[0])
     centre = values("physical/com_location")
     if mass < 0.0:
@@ -217,7 +217,7 @@ def _joints(name: str, element: etree._Element) -> list[tuple[str, str, Any, Any
         read_numbers(f"{name}: joint {key}", element.get(key), len(axes))
         for key in ("q_min", "q_max")
     )
-    found = []
+    sites = []
     for axis, lower, upper in zip(axes, low, high, strict=True):
         if lower > upper:
             raise XmlFault(f"{name}: joint q_min {lower:g} is above q_max {upper:g}")
@@ -225,19 +225,19 @@ def _joints(name: str, element: etree._Element) -> list[tuple[str, str, Any, Any
         xyz = AXES.get(axis.lower()) or read_numbers(f"{name}: joint axis", element.get("axis"), 3)
         kind = "prismatic" if axis in "XYZ!" else "revolute"
         limit = E.limit(effort=0.0, velocity=0.0, lower=lower, upper=upper)
-        found.append((kind, f"{name}_{tail or axis}", E.axis(xyz=xyz), limit))
-    return found
+        sites.append((kind, f"{name}_{tail or axis}", E.axis(xyz=xyz), limit))
+    return sites
 
 
 def _read_cables(
     root: etree._Element, links: list[_Link], elasticity: Elasticity, wanted: str | None
 ) -> list[Cable]:
-    sets = {str(each.get("id")): each for each in root.findall("cable_set")}
+    sets = {str(element.get("id")): element for element in root.findall("cable_set")}
     name = root.get("default_cable_set") if wanted is None else wanted
     if not isinstance(name, str) or name not in sets:
         raise unknown("set of cables", name, tuple(sets))
     if not len(sets[name]):
-        others = ", ".join(repr(each) for each in sets if len(sets[each])) or "none"
+        others = ", ".join(repr(name) for name in sets if len(sets[name])) or "none"
         raise XmlFault(f"the set {name!r} holds no cables; sets with cables are {others}")
     cables: list[Cable] = []
     used: Counter[str] = Counter()

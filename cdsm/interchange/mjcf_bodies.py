@@ -36,9 +36,9 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
     robot = parse_xml(arm.urdf, "robot")
     links = {str(link.get("name")): link for link in robot.findall("link")}
     joints = robot.findall("joint")
-    own = arm.springs
-    pairs = zip(own.stiffness.tolist(), own.angle.tolist(), strict=True)
-    springs = dict(zip(own.joints, pairs, strict=True))
+    joint_springs = arm.springs
+    pairs = zip(joint_springs.stiffness.tolist(), joint_springs.angle.tolist(), strict=True)
+    springs = dict(zip(joint_springs.joints, pairs, strict=True))
     (base,) = links.keys() - {joint.find("child").get("link") for joint in joints}
     world = etree.SubElement(root, "worldbody")
     # MuJoCo reserves the name world for its root
@@ -102,7 +102,7 @@ def _add_inertia(body: etree._Element, link: etree._Element) -> None:
     inertia = inertial.find("inertia")
     R = turn.as_matrix()
     keys = [[f"i{min(a, b)}{max(a, b)}" for b in "xyz"] for a in "xyz"]
-    tensor = R @ np.array([[float(inertia.get(key)) for key in each] for each in keys]) @ R.T
+    tensor = R @ np.array([[float(inertia.get(key)) for key in row] for row in keys]) @ R.T
     moments, axes = np.linalg.eigh(tensor)
     taken = np.maximum(moments, LEAST_INERTIA) if moments[0] < _SMALLEST else moments.copy()
     # first correct a needle: the largest moment must not fall below the second

@@ -64,11 +64,11 @@ class Clearance(Result):
 
     def __str__(self) -> str:
         values = zip(("cable", "link", "disk"), (self.cables, self.links, self.disks), strict=True)
-        said = []
+        lines = []
         for (what, value), (one, other) in zip(values, self.nearest, strict=True):
-            found = f"{1e3 * value:.4g} mm, {one} and {other}" if one else "none near"
-            said.append(f"cable to {what:<6} {found}")
-        return "\n".join(said)
+            text = f"{1e3 * value:.4g} mm, {one} and {other}" if one else "none near"
+            lines.append(f"cable to {what:<6} {text}")
+        return "\n".join(lines)
 
 
 def clearance(pose: Posture, diameter: float = 0.0, thickness: float = 0.0) -> Clearance:
@@ -90,8 +90,8 @@ def clearance(pose: Posture, diameter: float = 0.0, thickness: float = 0.0) -> C
     """
     d = checked_quantity("diameter", diameter, "diameter", zero=True)
     t = checked_quantity("thickness", thickness, "length", zero=True)
-    found = distances(instance("pose", pose, Posture), d, t)
-    cables, links, disks = (found[kind][0] for kind in KINDS)
+    nearest = distances(instance("pose", pose, Posture), d, t)
+    cables, links, disks = (nearest[kind][0] for kind in KINDS)
     return Clearance(
         posture=pose,
         diameter=d,
@@ -99,7 +99,7 @@ def clearance(pose: Posture, diameter: float = 0.0, thickness: float = 0.0) -> C
         cables=cables,
         links=links,
         disks=disks,
-        nearest=tuple(found[kind][1] for kind in KINDS),
+        nearest=tuple(nearest[kind][1] for kind in KINDS),
     )
 
 
@@ -114,10 +114,10 @@ def distances(
     names = [arm.cables[c].name for c in cable.tolist()]
     wires = _Bodies.bars(names, ends, np.full(cable.size, diameter / 2.0))
     disks = arm.geometry.disks if arm.is_serpentine else ()
-    found = dict[str, Named]()
+    nearest = dict[str, Named]()
     if "cable_clearance" in kinds:
         later = np.triu(np.ones((cable.size, cable.size), dtype=np.bool_))
-        found["cable_clearance"] = _nearest(wires, wires, later & (cable[:, None] != cable))
+        nearest["cable_clearance"] = _nearest(wires, wires, later & (cable[:, None] != cable))
     if "link_clearance" in kinds:
         bodies = arm.geometry.chain.bodies if arm.is_serpentine else ()
         radii = {
@@ -128,7 +128,9 @@ def distances(
         radius = np.array([radii.get(row, 0.0) for row in rows])
         lines = np.array(pose.bones).reshape(-1, 2, 3)
         bones = _Bodies.bars([links[row] for row in rows], lines, radius)
-        found["link_clearance"] = _nearest(wires, bones, np.ones((cable.size, len(rows)), np.bool_))
+        nearest["link_clearance"] = _nearest(
+            wires, bones, np.ones((cable.size, len(rows)), np.bool_)
+        )
     if "disk_clearance" in kinds:
         poses = arm.body.link_placements(pose.q)
         place = np.array([poses[disk.link] for disk in disks]).reshape(-1, 4, 4)
@@ -138,18 +140,18 @@ def distances(
         across = np.sqrt(np.clip(1.0 - axis**2, 0.0, 1.0))
         plates = _Bodies(
             [f"disk {number + 1}" for number in range(len(disks))],
-            [coal.Cylinder(each, thickness) for each in radius.tolist()],
+            [coal.Cylinder(rim, thickness) for rim in radius.tolist()],
             centre,
             axis,
             thickness / 2.0 * abs(axis) + radius[:, None] * across,
         )
         rim = _ways_to_the_rim(ends[:, :, None] - centre, axis, radius)
-        found["disk_clearance"] = _nearest(wires, plates, np.isinf(rim))
+        nearest["disk_clearance"] = _nearest(wires, plates, np.isinf(rim))
         if rim.size:
             i, j = divmod(int(rim.argmin()), len(disks))
             way = Named(rim[i, j] - diameter / 2.0, (names[i], plates.names[j]))
-            found["disk_clearance"] = min(found["disk_clearance"], way)
-    return found
+            nearest["disk_clearance"] = min(nearest["disk_clearance"], way)
+    return nearest
 
 
 def _ways_to_the_rim(away: Array, axis: Array, radius: Array) -> Array:
@@ -161,12 +163,12 @@ def _ways_to_the_rim(away: Array, axis: Array, radius: Array) -> Array:
     height = (away * axis).sum(axis=3)
     way = radius - np.linalg.norm(away - height[..., None] * axis, axis=3)
     held = (abs(height) < _ON) & (way > 0.0)
-    own = np.where(held, way, np.inf).min(axis=1)
+    held_way = np.where(held, way, np.inf).min(axis=1)
     crosses = (height.prod(axis=1) < 0.0) & ~held.any(axis=1)
     part = height[:, 0] / np.where(crosses, height[:, 0] - height[:, 1], 1.0)
     cut = away[:, 0] + part[..., None] * (away[:, 1] - away[:, 0])
     inside = radius - np.linalg.norm(cut, axis=2)
-    return np.asarray(np.where(crosses & (inside > 0.0), -inside, own))
+    return np.asarray(np.where(crosses & (inside > 0.0), -inside, held_way))
 
 
 class _Bodies:
@@ -191,7 +193,7 @@ class _Bodies:
         """Return round bars with round ends, along lines between points (n, 2, 3)."""
         along = ends[:, 1] - ends[:, 0]
         length = np.linalg.norm(along, axis=1)
-        shapes = [coal.Capsule(0.0, each) for each in length.tolist()]
+        shapes = [coal.Capsule(0.0, height) for height in length.tolist()]
         made = cls(names, shapes, ends.mean(axis=1), along / length[:, None], abs(along) / 2.0)
         made.radius = radius
         return made
@@ -212,7 +214,7 @@ def _nearest(one: _Bodies, other: _Bodies, pairs: NDArray[np.bool_]) -> Named:
     b = other.centre - offset
     square = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * a @ b.T
     apart = np.sqrt(np.maximum(square, 0.0)) - one.radius[:, None] - other.radius
-    reach = [np.linalg.norm(each.extent, axis=1) for each in (one, other)]
+    reach = [np.linalg.norm(bodies.extent, axis=1) for bodies in (one, other)]
     most = apart[pairs].min() + _MARGIN
     i, j = np.nonzero(pairs & (apart - reach[0][:, None] - reach[1] < most))
     gaps = np.maximum(abs(a[i] - b[j]) - one.extent[i] - other.extent[j], 0.0)

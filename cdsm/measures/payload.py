@@ -140,8 +140,8 @@ def payload(
     polytope = force_polytope(pose, minimum, maximum, W, worst_friction=worst_friction)
     softest = np.linalg.svd(C)[2][0]
     tried = [(u, limits(u)) for u in (polytope.worst_direction, softest, -softest)]
-    u, found = min(tried, key=lambda each: sorted(each[1].values()))
-    return Payload(posture=pose, direction=frozen(u), worst=True, limits=found)
+    u, least = min(tried, key=lambda trial: sorted(trial[1].values()))
+    return Payload(posture=pose, direction=frozen(u), worst=True, limits=least)
 
 
 def largest_force(farthest: Farthest) -> float:

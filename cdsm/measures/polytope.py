@@ -129,14 +129,14 @@ def force_polytope(
     if not np.isfinite(high).all():
         cable = pose.arm.cables[int(np.isinf(high).argmax())].name
         raise InvalidInput("maximum", f"{cable} has none; give a finite one [N].")
-    found = polytope_of(pose, W, low, high)
-    if found is None:
+    polytope = polytope_of(pose, W, low, high)
+    if polytope is None:
         distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
         raise CdsmError(
             "solver 'highs' finds no force, though tensions balance none. Change a bound.",
             Status.SOLVER_FAILED,
         )
-    return found
+    return polytope
 
 
 def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForcePolytope | None:

@@ -91,8 +91,8 @@ class CriticalTension(_Critical):
     @property
     def warnings(self) -> tuple[str, ...]:
         """One sentence if the arm is UNSTABLE at every lower bound; otherwise empty."""
-        said = "UNSTABLE at every lower bound from {:.4g} N to {:.4g} N"
-        return () if self.stable else (said.format(*self.examined),)
+        sentence = "UNSTABLE at every lower bound from {:.4g} N to {:.4g} N"
+        return () if self.stable else (sentence.format(*self.examined),)
 
     def __str__(self) -> str:
         verdict = f"buckles at a lower bound of {self.minimum:.4g} N"
@@ -176,9 +176,9 @@ def critical_tension(
     def at(minimum: float) -> Stiffness:
         return stiffness(pose, distribute_tension(pose, minimum, wrench=W))
 
-    laws = [each.elasticity for each in arm.cables if each.control == "position"]
+    laws = [cable.elasticity for cable in arm.cables if cable.control == "position"]
     low = max((law.low for law in laws), default=0.0) * _ABOVE
-    ends = [*(law.high for law in laws), *(each.maximum for each in arm.cables)]
+    ends = [*(law.high for law in laws), *(cable.maximum for cable in arm.cables)]
     high = max(min([*ends, checked_quantity("up_to", up_to, "tension")]), low)
     at(low)  # raises the reason if no tensions balance the arm
     first = max(low, _LOWEST if high > _LOWEST else _LOWEST * high)
@@ -281,7 +281,7 @@ def critical_load(
 
 def _margins(pose: Posture, minimum: Array, maximum: ArrayLike, wrenches: Array) -> Array:
     """Compute margins or NaN (n,) for lower bounds (C,) or (n, 1) and wrenches (6,) or (n, 6)."""
-    q = np.tile(pose.q, (max(len(np.atleast_2d(each)) for each in (minimum, wrenches)), 1))
+    q = np.tile(pose.q, (max(len(np.atleast_2d(rows)) for rows in (minimum, wrenches)), 1))
     bounds = np.broadcast_to(minimum, (len(q), len(pose.arm.cables))), maximum
     case: Any = {"minimum": bounds[0], "maximum": bounds[1], "check_limits": False}
     return np.asarray(evaluate(pose.arm, q, None, wrenches, ("margin",), **case)["margin"])

@@ -29,13 +29,13 @@ def follow(
         part = min(goal, share + step)
         arm = model(part)
         f = Balance(arm.at, arm.reference, arm.at_pose(before))
-        found = continued(f, (before.q / f.unit - stop_torque * f.unit / f.k,), before.q)
-        if found is not None and stable_between(arm.at, before.q, found.state.pose.q):
-            here = found
+        point = continued(f, (before.q / f.unit - stop_torque * f.unit / f.k,), before.q)
+        if point is not None and stable_between(arm.at, before.q, point.state.pose.q):
+            here = point
             share = part
             step = 2.0 * step
-            before = found.state.pose
-            stop_torque = found.stop_torque
+            before = point.state.pose
+            stop_torque = point.stop_torque
         elif step > _FINEST * max(share, 1e-9):
             step /= 2.0
         else:

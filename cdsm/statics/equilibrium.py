@@ -58,7 +58,7 @@ class Equilibrium(Result):
     reference_tension: Array = field(metadata=unit("N", "cable"))
     stiffness: Stiffness
     stop_torque: Array = field(metadata=unit("torque", "joint"))
-    _model: LockedArm
+    model: LockedArm
     motors: Literal["locked", "tension"] = field(default="locked", metadata=unit("1"))
     branch: float = field(default=1.0, metadata=unit("1"))
 
@@ -121,15 +121,15 @@ class Equilibrium(Result):
     @property
     def warnings(self) -> tuple[str, ...]:
         """A sentence if the arm jumped on the way here, and one if it is neutral here."""
-        said = list[str]()
+        sentences = list[str]()
         if self.branch < 1.0:
             part = f"at {100.0 * self.branch:.4g} % of load and pull its branch of equilibria ends"
-            said.append(f"JUMPED: {part}; from there the arm moves to this other one")
+            sentences.append(f"JUMPED: {part}; from there the arm moves to this other one")
         if not self.stable:
-            said.append("NEUTRAL: not every joint is brought back")
+            sentences.append("NEUTRAL: not every joint is brought back")
         elif self.neutral:
-            said.append("NEUTRAL: a motion of the joints meets hardly any resistance")
-        return tuple(said)
+            sentences.append("NEUTRAL: a motion of the joints meets hardly any resistance")
+        return tuple(sentences)
 
     @quantity("1")
     def slack(self) -> tuple[str, ...]:
@@ -144,22 +144,24 @@ class Equilibrium(Result):
         """Names of the joints that rest on a stop."""
         return tuple(self.pose.arm.joint_names[i] for i in np.flatnonzero(self.stop_torque))
 
-    def _resumed(self, pose: Posture, wrench: object) -> Equilibrium:
+    def resumed(self, pose: Posture, wrench: object) -> Equilibrium:
         """Return it as its own reference, its motors as they are, if ``pose`` is its own."""
         if wrench is not None:
             raise InvalidInput("wrench", "comes with the Equilibrium; leave it out here.")
         if not instance("pose", pose, Posture).equals(self.pose):
             raise InvalidInput("tension", "is the Equilibrium of another posture; give its pose.")
-        model = self._model.resumed(self.pose, self.tension)
-        own: Any = {"reference": self.pose, "reference_tension": self.tension, "branch": 1.0}
-        return replace(self, **own, _model=model)
+        model = self.model.resumed(self.pose, self.tension)
+        changes: Any = {"reference": self.pose, "reference_tension": self.tension, "branch": 1.0}
+        return replace(self, **changes, model=model)
 
     def held_posture(self, forced: NDArray[np.bool_]) -> Posture:
         """Return the posture, of an arm of which the cables ``forced`` (C,) have no stiffness."""
         if not forced.any():
             return self.pose
-        given = zip(self.pose.arm.cables, forced, strict=True)
-        cables = [replace(cable, control="force") if of else cable for cable, of in given]
+        pairs = zip(self.pose.arm.cables, forced, strict=True)
+        cables = [
+            replace(cable, control="force") if is_forced else cable for cable, is_forced in pairs
+        ]
         return self.pose.arm.with_cables(cables).at(self.pose.q, check_limits=False)
 
     @property
@@ -169,7 +171,7 @@ class Equilibrium(Result):
         return held & (self.motors == "tension")
 
     @property
-    def _paid_out(self) -> Array:
+    def paid_out(self) -> Array:
         """How much longer than straight the slack wires are (C,) [m], if motors hold lengths."""
         pose = self.pose
         F = self.tension
@@ -209,8 +211,8 @@ class Equilibrium(Result):
         Raises InvalidInput if a joint rests on its stop, which K_θ does not know.
         """
         if self.at_limit:
-            said = "does not know of stops, and"
-            raise InvalidInput("report", f"{said} {listed(self.at_limit)} rests on its own.")
+            problem = "does not know of stops, and"
+            raise InvalidInput("report", f"{problem} {listed(self.at_limit)} rests on its own.")
         pose = self.held_posture(self.stiffness.cable_stiffness == 0.0)
         return stiffness(pose, self.tension, self.wrench).report()
 
@@ -299,15 +301,15 @@ def settled(arm: LockedArm, start: Posture, reached: float = 0.0) -> Point:
     return settle(Balance(arm.at, arm.reference, arm.at_pose(start)), start.q, reached)
 
 
-def as_equilibrium(arm: LockedArm, found: Point, branch: float = 1.0) -> Equilibrium:
+def as_equilibrium(arm: LockedArm, point: Point, branch: float = 1.0) -> Equilibrium:
     """Return a solution as an Equilibrium; ElasticityRangeError if a tension is outside its law."""
     position = arm.reference.arm.cables.position_controlled
     return Equilibrium(
         reference=arm.reference,
         reference_tension=arm.tension,
-        stiffness=arm.stiffness(found.state.pose),
-        stop_torque=found.stop_torque,
-        _model=arm,
+        stiffness=arm.stiffness(point.state.pose),
+        stop_torque=point.stop_torque,
+        model=arm,
         motors="tension" if arm.tension_held or not position.any() else "locked",
         branch=branch,
     )

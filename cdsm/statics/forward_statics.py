@@ -63,15 +63,17 @@ def forward_statics(
         EquilibriumError: No stable equilibrium was found, or nothing holds a joint.
     """
     instance("arm", arm, Manipulator)
-    given = {"tension": tension, "rest_lengths": rest_lengths, "pull": pull}
-    named = [name for name, value in given.items() if value is not None]
+    commands = {"tension": tension, "rest_lengths": rest_lengths, "pull": pull}
+    named = [name for name, value in commands.items() if value is not None]
     if len(named) != 1:
-        said = f"give exactly one of {', '.join(given)}; {' and '.join(named) or 'none'} given."
-        raise InvalidInput("forward_statics", said)
+        problem = (
+            f"give exactly one of {', '.join(commands)}; {' and '.join(named) or 'none'} given."
+        )
+        raise InvalidInput("forward_statics", problem)
     W = wrench_vector("wrench", wrench)
     home = arm.at(home_angles(arm))
     begin = home if start is None else arm.at(start)
-    model = _model(arm, named[0], _of_all(arm, named[0], given[named[0]]), home, begin, W)
+    model = _model(arm, named[0], _of_all(arm, named[0], commands[named[0]]), home, begin, W)
     loaded = model(1.0)
     if start is not None:
         return as_equilibrium(loaded, settled(loaded, begin))
@@ -113,8 +115,8 @@ def _model(
         return lambda share: LockedArm(begin, share * F, share * wrench, tension_held=True)
     for cable in arm.cables:
         if cable.control == "force":
-            said = f"{cable.name} has control='force': its motor holds a tension, no length. "
-            raise InvalidInput(name, f"{said}Give tension, or this cable control='position'.")
+            problem = f"{cable.name} has control='force': its motor holds a tension, no length. "
+            raise InvalidInput(name, f"{problem}Give tension, or this cable control='position'.")
     least = np.array([cable.elasticity.rest for cable in arm.cables])
     straight = arm.laws.original_lengths(home.cable_lengths, least)
     if name == "pull":
@@ -125,8 +127,10 @@ def _model(
         rest = vector("rest_lengths", value, count, "one length [m] per cable", "length")
     if not (rest > 0.0).all():
         c = int(rest.argmin())
-        said = f"leaves {rest[c]:.4g} m of {arm.cables[c].name}, which is {straight[c]:.4g} m long."
-        raise InvalidInput(name, said)
+        problem = (
+            f"leaves {rest[c]:.4g} m of {arm.cables[c].name}, which is {straight[c]:.4g} m long."
+        )
+        raise InvalidInput(name, problem)
 
     def model(share: float) -> LockedArm:
         lengths = straight + share * (rest - straight)

@@ -212,11 +212,11 @@ def load_cycle(
     """
     slack = np.zeros(len(instance("pose", pose, Posture).arm.cables))
     if isinstance(tension, Equilibrium):
-        rest = tension._resumed(pose, None)
+        rest = tension.resumed(pose, None)
         pose = rest.held_posture(rest.force_controlled)
         F = rest.tension
         W = rest.wrench
-        slack = rest._paid_out
+        slack = rest.paid_out
     else:
         F, W = checked_tension(pose, tension, None)
     pose.arm.laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
@@ -245,7 +245,7 @@ def load_cycle(
     hole = pose.segments.chains.hole
     rough = pose.segments.chains.friction > 0.0
     arms = [state.arm_state for state in states]
-    last = np.array([each.chain.slip[hole] for each in arms])
+    last = np.array([arm_state.chain.slip[hole] for arm_state in arms])
     return LoadHistory(
         reference=pose,
         reference_tension=F,
@@ -253,9 +253,9 @@ def load_cycle(
         load=frozen(np.arange(len(loads))),
         wrenches=frozen(loads),
         motors=frozen(commands),
-        angles=frozen(np.array([each.pose.q for each in arms])),
-        tip=frozen(np.array([each.pose.tip[:3, 3] for each in arms])),
-        segment_tensions=frozen(np.array([each.chain.tension for each in arms])),
+        angles=frozen(np.array([arm_state.pose.q for arm_state in arms])),
+        tip=frozen(np.array([arm_state.pose.tip[:3, 3] for arm_state in arms])),
+        segment_tensions=frozen(np.array([arm_state.chain.tension for arm_state in arms])),
         slip=frozen(np.array([step.slip[hole] for step in steps])),
         sliding=frozen(np.where(rough, np.sign(last), 0.0).astype(np.int8)),
         stop_torque=frozen(np.array([state.stop_torque for state in states])),

@@ -59,15 +59,17 @@ class LockedArm:
         self._laws: list[_LockedLaw] = []
         if tension_held:
             return
-        own = laws.original_lengths(L, tension)
+        originals = laws.original_lengths(L, tension)
         length = L
         if rest_length is not None:  # at ``tension``, wire and spring have their rest lengths
-            own = length = np.where(reference.arm.cables.position_controlled, rest_length, L)
-        laws.require_wire(own, tension)
-        self.rest_length = frozen(own)
-        for law, of in laws.held:
-            F = tension[of]
-            locked = _LockedLaw(law, of, own[of], laws.series[of], F, law.strain(F), length[of])
+            originals = length = np.where(reference.arm.cables.position_controlled, rest_length, L)
+        laws.require_wire(originals, tension)
+        self.rest_length = frozen(originals)
+        for law, cables in laws.held:
+            F = tension[cables]
+            wire = originals[cables]
+            series = laws.series[cables]
+            locked = _LockedLaw(law, cables, wire, series, F, law.strain(F), length[cables])
             self._laws.append(locked)
 
     def under(self, wrench: Array) -> LockedArm:
@@ -97,16 +99,16 @@ class LockedArm:
     def stiffness(self, pose: Posture) -> Stiffness:
         """Return K_θ at a posture; ElasticityRangeError if a tension is outside its law."""
         F, k = self._tensions(pose)
-        for each in self._laws:
-            require_domain(pose.arm, each.law, each.of, F[each.of])
+        for locked in self._laws:
+            require_domain(pose.arm, locked.law, locked.cables, F[locked.cables])
         lengths = pose.cable_lengths if self.tension_held else self.rest_length
         return assemble(pose, frozen(F), self.wrench, frozen(k), free_length=lengths)
 
     def _tensions(self, pose: Posture) -> tuple[Array, Array]:
         F = self.tension.copy()
         k = np.zeros(self.tension.size)
-        for each in self._laws:
-            F[each.of], k[each.of] = each.tension(pose.cable_lengths[each.of])
+        for locked in self._laws:
+            F[locked.cables], k[locked.cables] = locked.tension(pose.cable_lengths[locked.cables])
         return F, k
 
 
@@ -114,7 +116,7 @@ class _LockedLaw(NamedTuple):
     """The n position-controlled cables with one law, in their order; arrays are (n,)."""
 
     law: Elasticity
-    of: Indices
+    cables: Indices
     rest_length: Array  # [m]
     series: Array  # compliance of the springs [m/N]
     start: Array  # a tension F_0 [N]
@@ -143,7 +145,7 @@ class _LockedLaw(NamedTuple):
 
 
 def require_domain(
-    arm: Manipulator, law: Elasticity, of: Indices, tension: Array, where: str = ""
+    arm: Manipulator, law: Elasticity, cables: Indices, tension: Array, where: str = ""
 ) -> None:
     """Raise ElasticityRangeError if the tensions F [N] of the cables ``of`` are outside their law.
 
@@ -154,5 +156,5 @@ def require_domain(
     try:
         law.require_inside(np.where(near, inside, tension))
     except ElasticityRangeError as error:
-        said = ElasticityRangeError(f"{where}{error.problem}", error.tension, error.indices)
-        raise arm.laws.naming(said, of) from None
+        named = ElasticityRangeError(f"{where}{error.problem}", error.tension, error.indices)
+        raise arm.laws.naming(named, cables) from None

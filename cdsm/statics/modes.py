@@ -61,7 +61,9 @@ class Modes(Result, Plotted):
 
     def __str__(self) -> str:
         names = np.array(self.stiffness.posture.arm.joint_names)
-        leading = [names[abs(each).argmax(axis=0)] for each in (self.shapes, self.growth_shapes)]
+        leading = [
+            names[abs(shapes).argmax(axis=0)] for shapes in (self.shapes, self.growth_shapes)
+        ]
         rows = [("mode", "frequency [Hz]", "moves most")]
         for k, frequency in enumerate(self.frequencies):
             rows.append((str(k + 1), f"{frequency:.4g}", leading[0][k]))
@@ -158,7 +160,7 @@ def vibrations(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:
     except np.linalg.LinAlgError:  # M is not positive definite
         motion = np.linalg.eigh(M)[1][:, 0]
         joint = stiffness.posture.arm.joint_names[int(abs(motion).argmax())]
-        said = f"a motion of {joint} moves no link of any mass. "
-        said += "Give the links a mass and moments of inertia."
-        raise SingularStiffness(said, frozen(motion)) from None
+        problem = f"a motion of {joint} moves no link of any mass. "
+        problem += "Give the links a mass and moments of inertia."
+        raise SingularStiffness(problem, frozen(motion)) from None
     return squares, scale[:, None] * shapes

@@ -115,23 +115,23 @@ class QuasiStaticArm:
             target = before.load.interpolate(load, goal)
             old = state.arm_state
             f = self._balance(state, target)
-            found: Point | None = continued(f, (state.x + motion, state.x), old.pose.q)
-            if found is None and goal - done > _SHORTEST:
+            point: Point | None = continued(f, (state.x + motion, state.x), old.pose.q)
+            if point is None and goal - done > _SHORTEST:
                 part = (goal - done) / 2.0
                 motion = 0.0 * motion
                 continue
-            if found is None:
-                found = settle(f, old.pose.q, done, what)
+            if point is None:
+                point = settle(f, old.pose.q, done, what)
                 snapped = True
-            new = found.state
+            new = point.state
             assert isinstance(new, ChainArmState)
             start = self._jumps(old)
             end = self._jumps(new)
             now = new.chain.slip
             again = now * last > 0.0  # these holes slid the same way before
             dissipated += float(np.where(again, (start + end) / 2.0, end) @ now)
-            motion = found.x - state.x
-            state = QuasiStaticState(target, new, found.x, found.stop_torque)
+            motion = point.x - state.x
+            state = QuasiStaticState(target, new, point.x, point.stop_torque)
             slip = slip + now
             last = now
             done = goal
@@ -175,9 +175,11 @@ class QuasiStaticArm:
 
     def _require_domains(self, tension: Array, what: str) -> None:
         cables = self.reference.arm.cables
-        for law, of in self._problem.laws:
+        for law, users in self._problem.laws:
             # a motor that holds the tension of a cable without friction needs no law
-            known = np.array([c for c in of if not self.forced[c] or any(cables[c].friction)], int)
+            known = np.array(
+                [c for c in users if not self.forced[c] or any(cables[c].friction)], int
+            )
             for extreme in (np.minimum, np.maximum):
                 F = extreme.reduceat(tension, self.start[:-1])[known]
                 require_domain(self.reference.arm, law, known, F, f"after {what}, ")

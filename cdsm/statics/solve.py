@@ -126,8 +126,8 @@ def settle(f: Balance, q: Array, reached: float = 0.0, load: str = "the load") -
 
     Raises EquilibriumError, which says that the part ``reached`` of ``load`` was borne.
     """
-    here, found = _descend(f, f(q / f.unit), 1e-3 * f.k)
-    if not found:
+    here, is_stable = _descend(f, f(q / f.unit), 1e-3 * f.k)
+    if not is_stable:
         raise _not_found(f.reference, here, reached, load)
     return here
 
@@ -140,8 +140,8 @@ def continued(f: Balance, guesses: Iterable[Array], before: Array) -> Point | No
     """
     for x in guesses:
         point = f.attempt(x)
-        here, found = _descend(f, point, 0.0, before / f.unit) if point else (None, False)
-        if found:
+        here, is_stable = _descend(f, point, 0.0, before / f.unit) if point else (None, False)
+        if is_stable:
             return here
     return None
 

@@ -72,14 +72,14 @@ class WeightTest(Result, Plotted):
         if self.history is not None:
             return frozen(self.history.tip[1:] - self.history.tip[0])
         start = self.unloaded.pose.tip[:3, 3]
-        return frozen(np.array([each.pose.tip[:3, 3] for each in self.states]) - start)
+        return frozen(np.array([state.pose.tip[:3, 3] for state in self.states]) - start)
 
     @quantity("N", "loads", "cable")
     def tensions(self) -> Array:
         """Cable tensions at each step (n, C) [N]; with friction, those at the motors."""
         if self.history is not None:
             return frozen(np.array([T[1:, 0] for T in self.history.tensions]).T)
-        return frozen(np.array([each.tension for each in self.states]))
+        return frozen(np.array([state.tension for state in self.states]))
 
     @property
     def displacement(self) -> Array:
@@ -146,7 +146,7 @@ class WeightTest(Result, Plotted):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences if, without the weight, the arm leaves its reference, or is not stable."""
-        said = list[str]()
+        sentences = list[str]()
         history = self.history
         if self.left_reference:
             moved = coordinates(1e3 * self.unloaded.displacement)
@@ -157,10 +157,10 @@ class WeightTest(Result, Plotted):
             left += f"mm, from where all that is {without or 'shown '}is measured"
             if history:
                 left += f"; with friction by {coordinates(1e3 * history.displacement[0])} mm"
-            said.append(f"LEFT ITS REFERENCE: {left}")
+            sentences.append(f"LEFT ITS REFERENCE: {left}")
         if not self.unloaded.stable:
-            said.append("NEUTRAL: before the weight, not every joint is brought back")
-        return (*said, *(history.warnings if history else ()))
+            sentences.append("NEUTRAL: before the weight, not every joint is brought back")
+        return (*sentences, *(history.warnings if history else ()))
 
     def __str__(self) -> str:
         rows = [f"{'load [N]':>10}{'x [mm]':>12}{'y [mm]':>12}{'z [mm]':>12}"]
@@ -189,8 +189,8 @@ class WeightTest(Result, Plotted):
         if self.history is None or self.stuck is None:
             return []
         if self.breakaway_load == 0.0:
-            said = "friction holds no cable here: "
-            return [f"{said}one is slack, or the cables go straight through all holes"]
+            reason = "friction holds no cable here: "
+            return [f"{reason}one is slack, or the cables go straight through all holes"]
         slides = f"at {self.sliding_load:.4g} N they slide: from here on the tangent is at most "
         slides += f"{100.0 * (SLIDING - 1.0):.0f} % above that of the same load without friction"
         if self.sliding_load == math.inf:
@@ -247,7 +247,7 @@ def weight_test(
         raise InvalidInput("force", "is zero; nothing moves, and there is nothing to measure.")
     steps = whole_number("steps", steps, 1, 1000)
     if isinstance(tension, Equilibrium):
-        unloaded = tension._resumed(pose, wrench)
+        unloaded = tension.resumed(pose, wrench)
         held = unloaded.held_posture(unloaded.force_controlled)
     else:
         unloaded = equilibrium(pose, tension, wrench)
@@ -257,24 +257,24 @@ def weight_test(
     W = unloaded.wrench
 
     def model(share: float) -> LockedArm:
-        return unloaded._model.under(frozen(W + share * added))
+        return unloaded.model.under(frozen(W + share * added))
 
     for i in range(steps):
         here = states[-1]
         goal = (i + 1) / steps
-        found, reached = follow(model, here.pose, here.stop_torque, i / steps, goal)
-        here = as_equilibrium(model(reached), found) if found else here
+        point, reached = follow(model, here.pose, here.stop_torque, i / steps, goal)
+        here = as_equilibrium(model(reached), point) if point else here
         if reached < goal:
             worst = int(abs(here.stiffness.critical_direction).argmax())
             joint = pose.arm.joint_names[worst]
             load = reached * np.linalg.norm(force)
-            said = f"the arm buckles at {100.0 * reached:.4g} % of the load, under {load:.4g} N"
-            raise EquilibriumError(f"{said}: {joint} buckles", here.residual, reached, joint)
+            problem = f"the arm buckles at {100.0 * reached:.4g} % of the load, under {load:.4g} N"
+            raise EquilibriumError(f"{problem}: {joint} buckles", here.residual, reached, joint)
         states.append(here)
     test = WeightTest(force=force, unloaded=unloaded, states=tuple(states[1:]))
     if math.isinf(test.frictionless) and math.isfinite(test.tangent):
-        said = f"{np.abs(force).max():.3g} N moves the tip by rounding only; hang at least "
-        raise InvalidInput("force", f"{said}{_MEASURED * pose.arm.length * test.tangent:.1g} N.")
+        problem = f"{np.abs(force).max():.3g} N moves the tip by rounding only; hang at least "
+        raise InvalidInput("force", f"{problem}{_MEASURED * pose.arm.length * test.tangent:.1g} N.")
     if not pose.arm.has_friction:
         return test
     return WeightTest(

@@ -167,6 +167,6 @@ def _rest(
         reference_tension=tension.values,
         stiffness=history.stiffness(-1),
         stop_torque=frozen(history.stop_torque[-1].copy()),
-        _model=LockedArm(pose, tension.values, wrench),
+        model=LockedArm(pose, tension.values, wrench),
     )
     return rest, history.sliding[-1] != 0

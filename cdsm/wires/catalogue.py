@@ -86,18 +86,18 @@ def table_of(law: Elasticity) -> dict[str, Any]:
 
 def from_table(table: object) -> Elasticity:
     """Build a law from a parsed TOML table; GeometryError lists what is wrong with it."""
-    given: dict[str, Any] = dict(table) if isinstance(table, dict) else {"kind": table}
+    entries: dict[str, Any] = dict(table) if isinstance(table, dict) else {"kind": table}
     usual: dict[str, Any] = {"kind": None, "factor": 1.0, "slack_below": False}
-    kind, factor, slack = (given.pop(key, value) for key, value in usual.items())
+    kind, factor, slack = (entries.pop(key, value) for key, value in usual.items())
     if kind not in [*_KINDS]:
         raise GeometryError([f"kind: must be one of {', '.join(_KINDS)}, but is {kind!r}"])
     keys = [*signature(_KINDS[kind]).parameters]
-    missing = [key for key in keys if key not in given]
-    others = [(key, did_you_mean(key, keys)) for key in given if key not in keys]
+    missing = [key for key in keys if key not in entries]
+    others = [(key, did_you_mean(key, keys)) for key in entries if key not in keys]
     faults = [f"{key}: is missing" for key in missing]
     faults += [f"{key}: is not a key of a {kind} law{meant}" for key, meant in others]
     try:
-        law = _KINDS[kind](**{key: given.get(key) for key in keys})
+        law = _KINDS[kind](**{key: entries.get(key) for key in keys})
         law = law if factor == 1.0 else law.scaled(factor)
         law = law.slack_below() if flag("slack_below", slack) else law
     except InvalidInput as error:

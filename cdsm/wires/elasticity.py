@@ -65,8 +65,8 @@ class Elasticity(Plotted):
 
         low, *_, high = ends = rising(low, joins, high)
         table = tabulate(rigidity, ends)
-        given = {"low": low, "high": high, "checksum": zlib.crc32(table[1].tobytes())}
-        return Elasticity(low, high, low, "", given, 1.0, *table)
+        values = {"low": low, "high": high, "checksum": zlib.crc32(table[1].tobytes())}
+        return Elasticity(low, high, low, "", values, 1.0, *table)
 
     @staticmethod
     def read(path: str | os.PathLike[str]) -> Elasticity:
@@ -109,10 +109,10 @@ class Elasticity(Plotted):
         EA = float(self.rigidity(self.low))
         if low > _SHORTEST * EA:
             slack = f"would be slack after shortening by {100.0 * low / EA:.3g} %"
-            said = (
+            problem = (
                 f"EA is only {EA:.4g} N at {low:g} N: a wire that keeps it {slack}. Begin higher."
             )
-            raise InvalidInput("slack_below", said)
+            raise InvalidInput("slack_below", problem)
         return Elasticity(**vars(self) | {"low": 0.0}) if low > 0.0 else self
 
     def rigidity(self, tension: ArrayLike) -> Array:
@@ -172,8 +172,8 @@ class Elasticity(Plotted):
         return hash((self.kind, self.factor, self.low, self.high))
 
     def __repr__(self) -> str:
-        given = self.arguments | ({"rigidity": self.factor} if self.constant_rigidity else {})
-        text = ", ".join(f"{name}={value!r}" for name, value in given.items())
+        values = self.arguments | ({"rigidity": self.factor} if self.constant_rigidity else {})
+        text = ", ".join(f"{name}={value!r}" for name, value in values.items())
         scaled = "" if self.constant_rigidity or self.factor == 1.0 else f".scaled({self.factor!r})"
         slack = ".slack_below()" * (self.low < self.rest)
         return f"{self.kind.capitalize()}Elasticity({text}){scaled}{slack}"
@@ -240,8 +240,8 @@ class Elasticity(Plotted):
         knots = np.union1d(self.low, self._knots)
         reached = length * self.evaluate(knots)[0] + series * (knots - self.rest)
         if (outside := (wanted < reached[0]) | (wanted > reached[-1] * (1.0 + 1e-15))).any():
-            given = f"the {name} {wanted[outside][0]:.6g}; it reaches {reached[-1]:.6g}."
-            problem = f"no tension of the domain {self._span} gives {given}"
+            reach = f"the {name} {wanted[outside][0]:.6g}; it reaches {reached[-1]:.6g}."
+            problem = f"no tension of the domain {self._span} gives {reach}"
             raise ElasticityRangeError(problem, indices=np.flatnonzero(outside).tolist())
         after = np.searchsorted(reached, wanted).clip(1, len(knots) - 1)
 
@@ -254,14 +254,14 @@ class Elasticity(Plotted):
 
 
 def newton_in_bracket(
-    of: Callable[[Array], tuple[Array, Array]], x: Array, low: Array, high: Array
+    function: Callable[[Array], tuple[Array, Array]], x: Array, low: Array, high: Array
 ) -> tuple[Array, Array]:
     """Find the roots of rising functions between ``low`` and ``high``, from x; any shape.
 
-    ``of`` returns values and slopes at x. Returns the roots, to 1e-13, and the slopes there.
+    ``function`` returns values and slopes at x. Returns the roots, to 1e-13, and the slopes there.
     """
     for _ in range(200):
-        value, slope = of(x)
+        value, slope = function(x)
         newton = x - value / slope
         if (abs(newton - x) <= 1e-13 * np.maximum(abs(x), 1.0)).all():
             break

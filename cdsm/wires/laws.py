@@ -98,13 +98,15 @@ class StrandElasticity(Elasticity):
         for join, ranges in zip(joins, pairwise(rows), strict=True):
             below, above = (polyval(join, row) for row in ranges)
             if abs(above - below) > _MEET * abs(below):
-                said = (
+                problem = (
                     f"ranges do not meet at {join:g} N: {below:.7g} N below, {above:.7g} N above. "
                 )
-                raise InvalidInput("coefficients", f"{said}More digits, or a TabulatedElasticity.")
-        given = {"coefficients": rows, "joins": tuple(joins), "low": low, "high": high}
+                raise InvalidInput(
+                    "coefficients", f"{problem}More digits, or a TabulatedElasticity."
+                )
+        values = {"coefficients": rows, "joins": tuple(joins), "low": low, "high": high}
         table = tabulate(lambda F: _piecewise(F, rows, joins), ends)
-        super().__init__(low, high, low, "strand", given, 1.0, *table)
+        super().__init__(low, high, low, "strand", values, 1.0, *table)
 
     @classmethod
     def eq19_repaired(cls) -> StrandElasticity:
@@ -139,8 +141,8 @@ class TabulatedElasticity(Elasticity):
     def __init__(self, tensions: Sequence[float], strains: Sequence[float]) -> None:
         from scipy.interpolate import CubicHermiteSpline, CubicSpline  # import slowly
 
-        given = {"tensions": _row("tensions", tensions, 2), "strains": _row("strains", strains, 2)}
-        F, strain = map(np.array, given.values())
+        values = {"tensions": _row("tensions", tensions, 2), "strains": _row("strains", strains, 2)}
+        F, strain = map(np.array, values.values())
         if F.size != strain.size:
             raise InvalidInput("strains", f"{strain.size} given for {F.size} tensions.")
         if F[0] < 0.0:
@@ -162,7 +164,7 @@ class TabulatedElasticity(Elasticity):
         low = float(F[0])
         high = float(F[-1])
         curve = CubicHermiteSpline(F, strain, slopes)
-        super().__init__(low, high, low, "tabulated", given, 1.0, F, curve.c[::-1])
+        super().__init__(low, high, low, "tabulated", values, 1.0, F, curve.c[::-1])
 
 
 def _piecewise(F: Array, rows: Sequence[Sequence[float]], joins: Sequence[float]) -> Array:
@@ -173,8 +175,8 @@ def rising(low: float, joins: Sequence[float], high: float) -> tuple[float, ...]
     """Return the ends of the ranges of a law [N], if they rise from 0 or more."""
     ends = scalar("low", low), *_row("joins", joins), scalar("high", high)
     if ends[0] < 0.0 or min(np.diff(ends)) <= 0.0:
-        said = f"0 <= low < high needed, with joins between that rise, but are {ends} N."
-        raise InvalidInput("joins" if joins else "low", said)
+        problem = f"0 <= low < high needed, with joins between that rise, but are {ends} N."
+        raise InvalidInput("joins" if joins else "low", problem)
     return ends
 
 

@@ -175,7 +175,8 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
     count = np.array([len(group) for group in groups])
     weight = np.sqrt(count / count.mean())
     tension, splines = _grid(force, noise)
-    (n, k) = (len(force), splines.shape[1])
+    n = len(force)
+    k = splines.shape[1]
     span = np.ptp(strain)
     reach = np.ptp(force)
     bends = np.hstack([np.diff(np.eye(k), 2, axis=0), np.zeros((k - 2, 1))])
@@ -194,8 +195,8 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
         EA, grid = curve(x)
         beyond = np.minimum(strain - grid[0], 0.0) * EA[0]
         beyond += np.maximum(strain - grid[-1], 0.0) * EA[-1]
-        found = np.interp(strain, grid, tension) + beyond
-        return np.asarray(weight * np.clip(found - force, -1e9, 1e9))
+        fitted = np.interp(strain, grid, tension) + beyond
+        return np.asarray(weight * np.clip(fitted - force, -1e9, 1e9))
 
     def slope(x: Array) -> Array:
         EA, grid = curve(x)

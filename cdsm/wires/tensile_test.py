@@ -241,16 +241,19 @@ def _gauge_length(sheet: _Sheet, header: _Header) -> float | None:
 
 def _fitting(row: list[str], columns: Sequence[str] | None) -> tuple[list[int], list[int]]:
     """Return the columns of a header that may be the displacement, and those of the force."""
-    cells = [(cell.lower(), _name_and_unit(cell)[0].lower()) for cell in row]
+    texts = [cell.lower() for cell in row]
+    names = [_name_and_unit(cell)[0].lower() for cell in row]
     if columns is not None:
-        a, b = ([k for k, c in enumerate(cells) if each.strip().lower() in c] for each in columns)
-        return a, b
-    a, b = (
-        [k for k, (_, name) in enumerate(cells) if w.search(name) and not _OTHER.search(name)]
-        for w in (_MOVED, _FORCE)
-    )
+        displacement, force = (column.strip().lower() for column in columns)
+        return (
+            [k for k, text in enumerate(texts) if displacement in text],
+            [k for k, text in enumerate(texts) if force in text],
+        )
+    places = [k for k, name in enumerate(names) if not _OTHER.search(name)]
+    displacements = [k for k in places if _MOVED.search(names[k])]
     # "strain (extension)" is no other gauge than the extension
-    return [k for k in a if not _COMPUTED.search(row[k])] or a, b
+    measured = [k for k in displacements if not _COMPUTED.search(row[k])]
+    return measured or displacements, [k for k in places if _FORCE.search(names[k])]
 
 
 def _name_and_unit(cell: str) -> tuple[str, str]:
