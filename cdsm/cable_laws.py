@@ -45,7 +45,6 @@ class CableLaws:
 
     def __init__(self, cables: tuple[Cable, ...], *, whole: bool = True) -> None:
         self._cables = cables
-        self._whole = whole
         locked = [(c, cable) for c, cable in enumerate(cables) if cable.control == "position"]
         # usually all cables have one law, and a slice is faster than indices
         self.held = [
@@ -63,6 +62,8 @@ class CableLaws:
             if law.constant_rigidity is not None:
                 constant[group] = law.constant_rigidity
                 linear[group] = 1.0
+        self._sprung = whole and bool(self.series.any())
+        self._may_fail = self._sprung or bool(self.nonlinear)
         self.constant = frozen(constant)
         self.linear = frozen(linear)
 
@@ -72,9 +73,8 @@ class CableLaws:
 
     def stiffness(self, lengths: Array, tension: Array) -> Array:
         """Compute 1/(l_0/EA(F) + 1/k_series) (C,) [N/m] at L and F (C,); 0: force-controlled."""
-        rigidities = self.rigidities(tension)
-        k = self.stiffness_of(lengths, tension, rigidities)
-        if k.min() < 0.0:
+        k = self.stiffness_of(lengths, tension, self.rigidities(tension))
+        if self._may_fail and k.min() < 0.0:
             for law, group in self.nonlinear:
                 self._evaluate(law, group, tension[group])
             self.require_wire(self.original_lengths(lengths, tension), tension)
@@ -90,10 +90,11 @@ class CableLaws:
         """
         series = self.series if series is None else series
         wire = lengths - series * (tension - self.rest)
-        exists = rigidities > 0.0
         with np.errstate(divide="ignore"):
-            k = np.where(exists, 1.0 / (wire / rigidities + series), rigidities)
-        return np.where(exists & (wire <= 0.0), -1.0, k) if self._whole else k
+            k = np.where(rigidities > 0.0, 1.0 / (wire / rigidities + series), rigidities)
+        if self._sprung:
+            k[(rigidities > 0.0) & (wire <= 0.0)] = -1.0
+        return k
 
     def require_wire(self, original_lengths: Array, tension: Array) -> None:
         """Raise ElasticityRangeError if l_0 (C,) [m] of a cable under F (C,) [N] is 0 or less."""

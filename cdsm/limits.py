@@ -11,9 +11,6 @@ from cdsm.status import Status
 from cdsm.support.format import beyond
 from cdsm.support.values import Array
 
-LIMIT_SLACK = 1e-9
-"""Angle [rad] beyond a limit that is accepted as rounding, e.g. of a conversion from degrees."""
-
 _STAY = "Stay inside, or widen joint_limit in the geometry (limit of a joint, or in a URDF)"
 
 UNCHECKED = ", or, in Python, pass check_limits=False to compute beyond them"
@@ -22,16 +19,18 @@ UNCHECKED = ", or, in Python, pass check_limits=False to compute beyond them"
 
 def beyond_limits(body: RigidBody, q: Array) -> NDArray[np.bool_]:
     """Return for each joint angle of q (…, nv) whether it is beyond its limits (…, nv)."""
-    return np.asarray((q < body.lower - LIMIT_SLACK) | (q > body.upper + LIMIT_SLACK))
+    return np.asarray((q < body.lowest) | (q > body.highest))
 
 
 def require_within_limits(body: RigidBody, q: Array) -> None:
     """Raise InvalidInput if an angle of q (nv,) is beyond its limits."""
+    outside = beyond_limits(body, q)
+    if not outside.any():
+        return
     texts = [
         beyond(body.joint_names[i], *values, body.joint_units[i])
-        for i in np.flatnonzero(beyond_limits(body, q)).tolist()
+        for i in np.flatnonzero(outside).tolist()
         for values in [(float(q[i]), float(body.lower[i]), float(body.upper[i]))]
     ]
-    if texts:
-        message = f"{listed(texts, 4, '; ')}. {_STAY}{UNCHECKED}."
-        raise InvalidInput("q", message, Status.BEYOND_LIMITS)
+    message = f"{listed(texts, 4, '; ')}. {_STAY}{UNCHECKED}."
+    raise InvalidInput("q", message, Status.BEYOND_LIMITS)

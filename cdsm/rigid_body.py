@@ -25,6 +25,9 @@ from cdsm.support.values import Array, frozen
 GRAVITY = (0.0, 0.0, -9.81)
 """Default gravity in base axes [m/s²]."""
 
+LIMIT_SLACK = 1e-9
+"""Angle [rad] beyond a limit that is accepted as rounding, e.g. of a conversion from degrees."""
+
 _ENDLESS = 1e300  # limit of a continuous joint in the text that Pinocchio reads
 
 
@@ -91,6 +94,8 @@ class RigidBody:
         self.upper: Array = frozen(_unlimited(model.upperPositionLimit))
         if self.coupling:
             self.lower, self.upper = limits_of(self.coupling, self.lower, self.upper)
+        self.lowest = frozen(self.lower - LIMIT_SLACK)
+        self.highest = frozen(self.upper + LIMIT_SLACK)
         self._frames = {
             frame.name: index
             for index, frame in enumerate(model.frames)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import ClassVar
 
 import numpy as np
@@ -22,7 +23,7 @@ from cdsm.definition import Term
 from cdsm.joints import Springs
 from cdsm.posture import Posture
 from cdsm.routing import cross
-from cdsm.support.values import Array
+from cdsm.support.values import Array, frozen
 
 CABLE_TERMS = ("active", "passive")
 """Names of the terms that depend on the tensions of the cables."""
@@ -120,15 +121,15 @@ class Loads:
 
     def torque(self, pose: Posture) -> Array:
         """Compute the sum of the torques (nv,) [N m]."""
-        return total(load.torque(pose) for load in self.loads)
+        return total([load.torque(pose) for load in self.loads])
 
     def torque_size(self, pose: Posture) -> Array:
         """Compute the sum of the magnitudes of the torques (nv,) [N m]."""
-        return total(load.torque_size(pose) for load in self.loads)
+        return total([load.torque_size(pose) for load in self.loads])
 
     def stiffness(self, pose: Posture) -> Array:
         """Compute the sum of the stiffnesses (nv, nv) [N m/rad]."""
-        return total(load.stiffness(pose) for load in self.loads)
+        return total([load.stiffness(pose) for load in self.loads])
 
 
 @dataclass(slots=True)
@@ -209,14 +210,26 @@ def load_stiffness(jacobian: Array, wrench: Array, tip_joints: NDArray[np.intp])
     Let joint a be before b on the way to the tip. A force f gives −(f × z_a)·v_b in the entries
     (a, b) and (b, a); a moment m gives −(m × z_a)·z_b in the entry (b, a) alone.
     """
-    load = np.zeros((jacobian.shape[1],) * 2)
-    if wrench.any():
-        v, z = np.split(jacobian[:, tip_joints], 2)
-        later = np.tri(len(tip_joints), k=-1)
-        force = (1.0 - later) * (cross(z, wrench[:3, None]).T @ v)
-        moment = later * (cross(z, wrench[3:, None]).T @ z)
-        load[np.ix_(tip_joints, tip_joints)] = force + force.T * later - moment
-    return load
+    nv = jacobian.shape[1]
+    if not wrench.any():
+        return np.zeros((nv, nv))
+    v, z = np.split(jacobian if len(tip_joints) == nv else jacobian[:, tip_joints], 2)
+    later, not_later = _order(len(tip_joints))
+    force = not_later * (cross(z, wrench[:3, None]).T @ v)
+    moment = later * (cross(z, wrench[3:, None]).T @ z)
+    load = force + force.T * later - moment
+    if len(tip_joints) == nv:  # in their order, base to tip
+        return load
+    stiffness = np.zeros((nv, nv))
+    stiffness[np.ix_(tip_joints, tip_joints)] = load
+    return stiffness
+
+
+@cache
+def _order(count: int) -> tuple[Array, Array]:
+    """Return where a row of (count, count) comes after its column, as 0 or 1, and the opposite."""
+    later = np.tri(count, k=-1)
+    return frozen(later), frozen(1.0 - later)
 
 
 def without_cables(
@@ -232,12 +245,12 @@ def without_cables(
 
 def torque_of(terms: Iterable[Term], pose: Posture) -> Array:
     """Compute the sum of the torques of ``terms`` (nv,) [N m]."""
-    return total(term.torque(pose) for term in terms)
+    return total([term.torque(pose) for term in terms])
 
 
 def torque_size_of(terms: Iterable[Term], pose: Posture) -> Array:
     """Compute the sum of the magnitudes of their torques (nv,) [N m], which sets the rounding."""
-    return total(torque_size(term, pose) for term in terms)
+    return total([torque_size(term, pose) for term in terms])
 
 
 def torque_size(term: Term, pose: Posture) -> Array:
@@ -248,7 +261,7 @@ def torque_size(term: Term, pose: Posture) -> Array:
 
 def stiffness_of(terms: Iterable[Term], pose: Posture) -> Array:
     """Compute the sum of the stiffnesses of ``terms`` (nv, nv) [N m/rad]."""
-    return total(term.stiffness(pose) for term in terms)
+    return total([term.stiffness(pose) for term in terms])
 
 
 def required_torque(pose: Posture, wrench: Array) -> Array:
@@ -259,12 +272,11 @@ def required_torque(pose: Posture, wrench: Array) -> Array:
     return -torque_of(without_cables(pose, wrench), pose)
 
 
-def total(parts: Iterable[Array]) -> Array:
+def total(parts: Sequence[Array]) -> Array:
     """Compute the sum of arrays of one shape, in their order."""
-    first, *others = parts
-    if not others:
-        return first
-    result = first + others[0]
-    for part in others[1:]:
+    if len(parts) == 1:
+        return parts[0]
+    result = parts[0] + parts[1]
+    for part in parts[2:]:
         result += part  # in place, which is faster
     return result

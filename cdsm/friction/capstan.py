@@ -234,7 +234,7 @@ def assemble_segments(
     return replace(
         frictionless,
         terms=terms,
-        joint=frozen(total(terms.values())),
+        joint=frozen(total([*terms.values()])),
         friction=friction,
         segment_tension=frozen(tension),
         tension_gradient=frozen(gradient),

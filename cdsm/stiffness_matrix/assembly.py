@@ -76,7 +76,7 @@ def assemble(
         wrench=wrench,
         cable_stiffness=cable_stiffness,
         terms=terms,
-        joint=frozen(total(terms.values())),
+        joint=frozen(total([*terms.values()])),
         free_length=free_length,
         distribution=distribution,
     )

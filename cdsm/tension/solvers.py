@@ -122,7 +122,9 @@ def solve(problem: TensionProblem, solver: str) -> Solution:
     def failed(message: str) -> Solution:
         return no_solution(low.size, Status.SOLVER_FAILED, message)
 
-    sides: dict[str, Array] = {"A": basis.T @ A, "b": basis.T @ b, "lb": low, "ub": high}
+    sides: dict[str, Array] = {"A": A, "b": b, "lb": low, "ub": high}
+    if basis is not None:
+        sides |= {"A": basis.T @ A, "b": basis.T @ b}
     qp = qpsolvers.Problem(np.eye(low.size), np.zeros(low.size), **sides)
     # others warn of dense matrices, and of failures that are reported below; this takes 20 µs
     quiet = nullcontext() if solver == DEFAULT_SOLVER else without_warnings()
@@ -134,7 +136,7 @@ def solve(problem: TensionProblem, solver: str) -> Solution:
     if not answer.found or answer.x is None or answer.y is None:
         return failed("found no solution with multipliers")
     x = np.asarray(answer.x)
-    y = basis @ answer.y
+    y = np.asarray(answer.y if basis is None else basis @ answer.y)
     if not np.isfinite([x.sum(), y.sum()]).all():
         return failed("calls numbers optimal that are not finite")
     least = -(y @ A)  # the optimum but for the bounds
@@ -152,10 +154,13 @@ def solve(problem: TensionProblem, solver: str) -> Solution:
     return Solution(np.asarray(np.minimum(np.maximum(x, low), high)))
 
 
-def _independent(A: Array) -> Array:
-    """Return independent combinations of joints (nv, r): solvers fail at redundant ones."""
+def _independent(A: Array) -> Array | None:
+    """Return independent combinations of joints (nv, r), since solvers fail at redundant ones.
+
+    With more cables than joints all joints count as independent: None.
+    """
     if A.shape[0] < A.shape[1]:
-        return np.eye(len(A))
+        return None
     U, size, _ = np.linalg.svd(A, full_matrices=False)
     known = size > _ROUNDING * size[0]
     return np.asarray(U[:, known] / size[known])
