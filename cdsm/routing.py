@@ -204,7 +204,10 @@ class Routing:
 
     def hessian(self, spans: Spans, weight: Array) -> Array:
         """Compute Σ weight_s ∂²ℓ_s/∂θ² (nv, nv): H_L·F if the weights (S,) are tensions."""
-        return np.asarray(self.hessians(spans, weight, np.zeros_like(self.cable), 1)[0])
+        _, source, target = self._pairs
+        pairs = self._products(spans, weight)[source]
+        H = _sum(target, pairs, self.joint_count**2).reshape(self.joint_count, self.joint_count)
+        return self.coupling.square(H) if self.coupling else H
 
     def hessians(self, spans: Spans, weight: Array, group: Indices, count: int) -> Array:
         """Compute the same sums for each of ``count`` groups of segments (count, nv, nv)."""

@@ -49,10 +49,11 @@ def checked_tension(
             problem = f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
             raise InvalidInput("tension", problem)
         return F, wrench_vector("wrench", NO_WRENCH if wrench is None else wrench)
-    if not np.array_equal(tension.posture.q, pose.q):
-        raise InvalidInput("tension", "is of another posture; distribute it at this one.")
-    if not tension.posture.equals(pose):
-        raise InvalidInput("tension", f"was distributed for {ANOTHER_ARM}")
+    if tension.posture is not pose:
+        if not np.array_equal(tension.posture.q, pose.q):
+            raise InvalidInput("tension", "is of another posture; distribute it at this one.")
+        if not tension.posture.equals(pose):
+            raise InvalidInput("tension", f"was distributed for {ANOTHER_ARM}")
     if wrench is not None:
         raise InvalidInput("wrench", "comes with the Tension; leave it out here.")
     return tension.values, tension.wrench
