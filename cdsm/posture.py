@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+from cdsm.cable_path import positions
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry.parts import overlapping
 from cdsm.routing import Routing, Spans
@@ -112,10 +113,13 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def cable_paths(self) -> tuple[Array, ...]:
-        """Sites of each cable in base axes, one array (sites, 3) per cable [m]."""
+        """Points along each cable in base axes, one array (n, 3) per cable [m].
+
+        They are its sites, and points on its arcs around pulleys, at most 10° apart.
+        """
         if self.wrapping:
             return self.wrapping.paths
-        ends = np.cumsum([len(cable.sites) for cable in self.arm.cables])
+        ends = np.cumsum([len(positions(cable.sites)) for cable in self.arm.cables])
         return tuple(frozen(path.copy()) for path in np.split(self.sites.T, ends[:-1]))
 
     @property

@@ -466,6 +466,17 @@ class Wrapping:
             paths.append(frozen(np.array(path)))
         return tuple(paths)
 
+    @cached_property
+    def rims(self) -> Array:
+        """Points (P, 37, 3) [m] on the circle of each pulley, at the radius of the cable."""
+        turn = np.linspace(0.0, 2.0 * np.pi, 37)
+        across = np.eye(3)[abs(self.axis).argmin(axis=0)]  # no pulley has its axis along it
+        first = np.cross(self.axis.T, across)
+        first *= (self.wraps.radius / np.linalg.norm(first, axis=1))[:, None]
+        second = np.cross(self.axis.T, first)
+        circle = np.cos(turn)[:, None] * first[:, None] + np.sin(turn)[:, None] * second[:, None]
+        return frozen(self.centre.T[:, None] + circle)
+
     def _arc(self, pulley: int, begin: Array) -> list[Array]:
         """Return points on the arc of a pulley that begins at ``begin``, seen from the centre."""
         axis = self.axis[:, pulley]

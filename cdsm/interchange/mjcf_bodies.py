@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from lxml import etree
-from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from cdsm.interchange.mjcf_cables import GHOST, Side, add_entries, row
 from cdsm.joints import Coupling
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import parse_xml
@@ -18,16 +18,14 @@ _MASS = 1e-6  # of bodies without mass in MuJoCo [kg], [kg m²]
 LEAST_INERTIA = 1e-9
 _SMALLEST = 1e-12  # a smaller mass [kg] or moment of inertia [kg m²] of a body counts as zero
 _ROUNDING = 1e-9  # relative; MuJoCo refuses a moment of inertia above the sum of the other two
-_SITE, _STICK = 1e-3, 0.008  # radius [m] of a drawn hole; of a stick over the length of the arm
-_GHOST = {"contype": "0", "conaffinity": "0", "mass": "0"}  # drawn, without mass or contacts
+_TIP = 1e-3  # radius of the drawn tip [m]
+_STICK = 0.008  # radius of a drawn link, over the length of the arm
 
 
-NO_PULLEYS = "the export to MuJoCo knows no pulleys and sheaths yet."
-"""What :meth:`Cable.only_sites` says of cables that are not exported."""
-
-
-def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float]) -> None:
-    """Add the tree of links to ``root``.
+def add_bodies(
+    root: etree._Element, arm: Manipulator, start: Mapping[str, float], sides: list[Side]
+) -> None:
+    """Add the tree of links to ``root``; ``sides`` are the side sites of all pulleys.
 
     The file has the links at the joint coordinates ``start`` [rad or m], by joint name. MuJoCo
     moves a joint by qpos − ref from its place in the file. Since ref is ``start``, a new ``mjData``
@@ -55,16 +53,10 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
             for end in [_place(joint)[0] for joint in below]:
                 if np.linalg.norm(end) > thick:
                     line = {"fromto": f"0 0 0 {row(end)}", "size": repr(thick)}
-                    etree.SubElement(body, "geom", type="capsule", **line, **_GHOST)
-        sites = [
-            (f"{cable.name}/{i}", site.position)
-            for cable in arm.cables
-            for i, site in enumerate(cable.only_sites(NO_PULLEYS), start=1)
-            if site.link == name
-        ]
-        sites += [("tool0", (0.0, 0.0, 0.0))] if name == arm.tip_link else []
-        for hole, position in sites:
-            etree.SubElement(body, "site", name=hole, pos=row(position), size=repr(_SITE))
+                    etree.SubElement(body, "geom", type="capsule", **line, **GHOST)
+        add_entries(body, name, arm, sides)
+        if name == arm.tip_link:
+            etree.SubElement(body, "site", name="tool0", pos=row((0.0, 0.0, 0.0)), size=repr(_TIP))
         for joint in below:
             child = joint.find("child").get("link")
             turns = joint.get("type") != "prismatic"
@@ -123,7 +115,7 @@ def _shape(body: etree._Element, visual: etree._Element) -> bool:
     if shape.tag != "box":
         size = np.array([float(shape.get("radius")), float(shape.get("length", "0")) / 2.0])
     look = {"type": shape.tag, "size": row(size), **_placed(*_place(visual))}
-    etree.SubElement(body, "geom", **look, **_GHOST)
+    etree.SubElement(body, "geom", **look, **GHOST)
     return True
 
 
@@ -139,11 +131,6 @@ def _place(element: etree._Element) -> tuple[Array, Rotation]:
 
 def _placed(place: Array, turn: Rotation) -> dict[str, str]:
     return {"pos": row(place), "quat": row(np.roll(turn.as_quat(), 1))}
-
-
-def row(values: ArrayLike) -> str:
-    """Format numbers as the text of an MJCF attribute, exact to the last bit."""
-    return " ".join(repr(float(x)) for x in np.ravel(values))
 
 
 def couple(

@@ -209,6 +209,10 @@ def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
             named = {"label": label} if arm.slides.any() else {}
             axes.plot(*(MM * pose.joint_positions[chosen].T), marker, **look, **named)
     draw_bones(axes, pose, color="0.1", linewidth=2.0)
+    if pose.wrapping:  # pulleys; dashed where the cable does not touch
+        for rim, touches in zip(pose.wrapping.rims, pose.wrapping.touches, strict=True):
+            look = {"color": "0.45", "linewidth": 0.6, "linestyle": "-" if touches else "--"}
+            axes.plot(*(MM * rim.T), **look)
     for i, path in enumerate(pose.cable_paths):
         axes.plot(*(MM * path.T), color=style.SKY if colors is None else colors[i], linewidth=0.9)
 
