@@ -204,7 +204,7 @@ class ComputedArm(Printed):
         free = plural(self.nv, "degree") + " of freedom"
         if self.is_serpentine:
             free = f"{plural(len(self.geometry.joints), 'joint')} ({free})"
-        return f"{self.name}: {free}, {plural(len(self.cables), 'cable')}, {self.length:.6g} m long"
+        return f"{self.name}: {free}, {plural(len(self.cables), 'cable')}, {self.length:.4g} m long"
 
     def beyond_limits(self, q: Array) -> NDArray[np.bool_]:
         """Return for each joint angle of q (…, nv) whether it is beyond its limits (…, nv)."""

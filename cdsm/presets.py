@@ -56,16 +56,20 @@ def virtual_prototype_geometry(
 
     The paper gives no more. Three cables per joint, which end on the first disk after the joint,
     are assumed, as are the mass of every link [kg], the ``lead`` [m] before the base disk, and
-    the friction coefficient in all holes; the paper has none.
+    the friction coefficient in all holes; the paper has none. Each axis turns until its disks touch
+    while the other one is at zero; with both at this limit, disks overlap.
     """
+    disk_offset = 0.01
+    hole_radius = 0.03
     return Geometry.universal(
         name="virtual_prototype",
         joints=5,
         cables_per_joint=3,
         link_length=0.04,
         base_length=0.02,
-        disk_offset=0.01,
-        hole_radius=0.03,
+        disk_offset=disk_offset,
+        hole_radius=hole_radius,
+        joint_limit=2.0 * math.atan(disk_offset / hole_radius),
         link_mass=link_mass,
         lead=lead,
         friction=friction,

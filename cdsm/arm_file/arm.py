@@ -119,6 +119,9 @@ def _routed(cable: Cable, settings: dict[str, Any]) -> dict[str, Any]:
     return {"name": cable.name, **lead, **settings, "sites": one_line_each(sites)}
 
 
+HELD: Final = 0.35
+"""Joint limit of a first arm of universal joints [rad]: cables hold nearly all postures within."""
+
 _OTHERS: Final = ("geometry", "urdf", "cables", "wire", "original_length")
 _KEYS: Final = tuple(key for key in ArmFile.__annotations__ if key not in _OTHERS)
 """Keys of a file that are attributes of an arm; its robot and its cables are more than one key."""
@@ -215,6 +218,9 @@ def template(
         values |= {f"{key}_degrees": f"{math.degrees(x):.4g}" for key, x in sizes.items()}
         values["kind"] = kind if len(sections) == 1 else f"sections.{kind}"
         values["start"] = "end of the section before" if i else "base frame"
+        values["limit_reason"] = "disks touch there, as by default"
+        if kind == "universal" and sizes["joint_limit"] == HELD:
+            values["limit_reason"] = "cables often cannot hold more; default: disks touch"
         values["disk_radius"] = f"{1.2 * sizes['hole_radius']:.4g}"
         values["cable_radius"] = f"{sizes['hole_radius'] / 2.0:.4g}"
         kept = [line for line in lines if line[0] in "#[" or line.split(" = ")[0] in sizes]

@@ -130,18 +130,23 @@ def _serpentine(
     kind: str, counts: list[int], law: cdsm.Elasticity
 ) -> tuple[cdsm.Manipulator, list[tuple[str, dict[str, float]]]]:
     """Build an arm of sections with these numbers of joints; return it with the sizes of each."""
+    from cdsm.arm_file.arm import HELD
+
     hinged = kind == "hinged"
     parts = []
     for i, count in enumerate(counts):
         each = 2 if hinged else 3
         sizes = {"joints": count} | ({"twist": math.pi / 2.0} if hinged else {})
         sizes |= {"cables_per_joint": each, "link_length": 0.06, "base_length": 0.0 if i else 0.03}
-        sizes |= {"disk_offset": 0.012, "hole_radius": 0.025 * 0.75**i, "link_mass": 0.12}
-        sizes["lead"] = 0.3
+        radius = round(0.025 * 0.75**i, 6)
+        sizes |= {"disk_offset": 0.012, "hole_radius": radius, "link_mass": 0.12, "lead": 0.3}
         if hinged:  # 10 degrees, or less: holes of one plane must not reach those of the next
             sizes["spread"] = min(math.radians(10.0), math.tau / (count * each))
         if i:  # between the holes of all sections, wherever those are
             sizes["phase"] = math.tau / math.lcm(*counts) / each * i / len(counts)
+        build = getattr(cdsm.Geometry, kind)
+        touching = math.floor(1e3 * min(build(**sizes).joint_limits)) / 1e3
+        sizes["joint_limit"] = touching if hinged else min(HELD, touching)
         parts.append((kind, sizes))
     built = [getattr(cdsm.Geometry, kind)(**sizes) for _, sizes in parts]
     return cdsm.Manipulator(cdsm.Geometry.sections(built), law), parts

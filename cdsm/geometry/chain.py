@@ -14,10 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from cdsm.geometry.parts import Disk, Joint, Link
-
-STEEPEST = math.radians(80.0)
-"""Largest angle of a joint without a limit of its own [rad]."""
+from cdsm.geometry.parts import STEEPEST, Disk, Joint, Link
 
 _MOST_AXES = 400  # one behind the other; many more crash the parser of URDFs
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -191,7 +188,8 @@ def _start(
     """Add joint k with the disk after it; return where x = 0 of its link is behind the joint."""
     (before, h) = offsets
     (radius, outer, limit) = sizes
-    stops = joint.limit is None
+    # with a limit of its own, holes may still meet at its end
+    stops = joint.limit is None or limit >= 2.0 * math.atan(joint.disk_offset / radius)
     chain.at = k
     bends = link.bending_stiffness is not None
     if not joint.axes:

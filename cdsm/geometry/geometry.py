@@ -18,7 +18,7 @@ from pydantic import Field, TypeAdapter, model_validator
 
 from cdsm.errors import GeometryError, listed, warn
 from cdsm.geometry.beams import Backbone
-from cdsm.geometry.chain import STEEPEST, Chain, chain_of
+from cdsm.geometry.chain import Chain, chain_of
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
 from cdsm.geometry.uniform import Hinged, Universal, same_angle, spread_out
 from cdsm.support import records, validation
@@ -241,8 +241,7 @@ class Geometry(Printed):
     def joint_limits(self) -> tuple[float, ...]:
         """Limit of each joint [rad]: the given one, or where disks touch, as in :class:`Joint`."""
         joints = zip(self.joints, self.hole_radii, strict=True)
-        touch = [2.0 * math.atan(j.disk_offset / (j.disk_radius or R)) for j, R in joints]
-        return tuple(j.limit or min(x, STEEPEST) for j, x in zip(self.joints, touch, strict=True))
+        return tuple(joint.limit or joint.limit_of_disks(R) for joint, R in joints)
 
     @property
     def disks(self) -> tuple[Disk, ...]:

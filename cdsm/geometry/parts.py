@@ -13,6 +13,9 @@ from cdsm.support import records
 from cdsm.support.values import Array
 
 MAXIMUM_JOINTS = 100
+STEEPEST = math.radians(80.0)
+"""Largest bend of a joint without a limit of its own [rad]."""
+
 JointLimit = Annotated[records.Number, Field(gt=0, le=math.pi)]
 Pieces = Annotated[records.Integer, Field(ge=1, le=20)]
 
@@ -27,8 +30,10 @@ class Joint:
         axes: One axis (hinge), or the first and the second axis (universal joint), in the frame of
             the previous link. Any length; no axis is zero, and two axes are not parallel.
         disk_offset: h: distance from the joint centre to the disk on each side [m].
-        limit: Largest angle about each axis in both directions [rad]; None: the angle 2 atan(h/r)
-            at which disks of radius r touch, at most 80°; r is ``disk_radius``, or else R.
+        limit: Largest angle about each axis in both directions [rad]; None: where disks of radius r
+            touch, with r = ``disk_radius``, or else R. They touch at the bend γ = 2 atan(h/r), or
+            80° if that is less; a universal joint bends so far if both axes turn by
+            arccos √cos γ, which is its limit.
         hole_radius: R: distance of the holes of its two disks from the arm's axis [m]; None: the
             ``hole_radius`` of the :class:`Geometry`.
         disk_radius: Outer radius of the two disks [m]; None: 1.1 times the distance of the farthest
@@ -68,6 +73,14 @@ class Joint:
         if len(units) == 2 and np.linalg.norm(np.cross(*units)) < 1e-6:
             raise records.CrossFaults([f"axes: {self.axes} are parallel; one would do"])
         return self
+
+    def limit_of_disks(self, hole_radius: float) -> float:
+        """Return the limit [rad] where disks touch, if the joint has no limit of its own."""
+        bend = min(2.0 * math.atan(self.disk_offset / (self.disk_radius or hole_radius)), STEEPEST)
+        if len(self.axes) < 2:
+            return bend
+        # two axes at right angles, both turned by x, bend the arm by γ: cos γ = cos² x
+        return math.acos(math.sqrt(math.cos(bend)))
 
 
 @records.record

@@ -30,7 +30,7 @@ ARMS: dict[str, Callable[[], cdsm.Manipulator]] = {
 def shallow_arm(joints: int) -> cdsm.Manipulator:
     """Disks so near the joints that many postures cannot be held."""
     sizes = {"link_length": 0.04, "base_length": 0.02, "disk_offset": 0.005, "hole_radius": 0.03}
-    geometry = readme_geometry(joints=joints, link_mass=0.5, lead=0.0, **sizes)
+    geometry = readme_geometry(joints=joints, link_mass=0.5, lead=0.0, joint_limit=0.33, **sizes)
     return cdsm.Manipulator(geometry, STEEL, gravity=(0.0, -9.81, 0.0))
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import cdsm
@@ -102,8 +103,14 @@ def test_limits_are_where_the_disks_touch_and_never_above_80_degrees() -> None:
         ({"disk_radius": [0.025, 0.03, 0.04]}, (8 / 25, 8 / 30, 8 / 40)),
         ({"hole_radius": 0.001}, [math.tan(math.radians(40.0))] * 3),
     ):
-        expected = [2.0 * math.atan(ratio) for ratio in ratios]
-        assert universal(**changes).joint_limits == pytest.approx(expected)
+        bends = [2.0 * math.atan(ratio) for ratio in ratios]
+        geometry = universal(**changes)
+        for limit, bend in zip(geometry.joint_limits, bends, strict=True):
+            about_y = pin.rpy.rpyToMatrix(0.0, limit, 0.0)
+            about_z = pin.rpy.rpyToMatrix(0.0, 0.0, limit)
+            assert (about_y @ about_z)[0, 0] == pytest.approx(math.cos(bend))
+        hinges = cdsm.Geometry.hinged(**{**HINGED, **changes})
+        assert hinges.joint_limits == pytest.approx(bends)
 
 
 def test_replace_checks_what_it_changes() -> None:

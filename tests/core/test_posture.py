@@ -60,7 +60,8 @@ def test_neighbours_are_left_to_their_joint_limits() -> None:
 
 def ring(degrees: float) -> cdsm.Posture:
     """Eight links of 60 mm with disks of 22 mm, bent alike in one plane."""
-    geometry = readme_geometry(joints=8, base_length=0.05, hole_radius=0.02, link_mass=0.05, lead=0)
+    sizes = {"base_length": 0.05, "hole_radius": 0.02, "link_mass": 0.05, "lead": 0.0}
+    geometry = readme_geometry(joints=8, joint_limit=1.0, **sizes)
     arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e4))
     return arm.at(np.radians(degrees) * (np.arange(arm.nv) % 2 == 0))
 

@@ -161,7 +161,8 @@ def test_a_slight_torque_that_no_cable_exerts_is_missing_all_the_same() -> None:
 def test_a_solver_that_calls_the_infeasible_optimal_is_not_believed() -> None:
     """One cable for two axes: DAQP finds an optimum, which balances nothing."""
     sizes = {"link_length": 0.1, "base_length": 0.02, "disk_offset": 0.01, "hole_radius": 0.03}
-    geometry = readme_geometry(joints=1, cables_per_joint=1, link_mass=0.1, lead=0.0, **sizes)
+    sizes |= {"link_mass": 0.1, "lead": 0.0, "joint_limit": 0.64}
+    geometry = readme_geometry(joints=1, cables_per_joint=1, **sizes)
     for q in ((-0.0955, -0.4484), (0.1, 0.2), (-0.3, 0.05), (0.2, -0.6)):
         refused(cdsm.Manipulator(geometry, STEEL).at(q))
 
