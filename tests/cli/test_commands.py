@@ -311,7 +311,7 @@ def test_export(probe: Path, pose: cdsm.Posture, tmp_path: Path) -> None:
     text = cdsm.to_mjcf(pose.arm, pose, cdsm.distribute_tension(pose, 20.0), actuators="none")
     assert model.read_text(encoding="utf-8") == text
     assert found["actuators"] == "none"
-    soft = ("--set", "wire=1e9", "--set", "series_stiffness=200", "--minimum", 60)
+    soft = ("--set", "universal.lead=0.4", "--set", "series_stiffness=200", "--minimum", 60)
     assert told("export", probe, model, "--angles", 5, *soft, code=3)["stable"] is False
 
 

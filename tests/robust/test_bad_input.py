@@ -99,6 +99,7 @@ CASES: dict[str, tuple[Callable[[], object], str]] = {
         ("law a name", manipulator("1x19-1.2mm"), "elasticity: '1x19-1.2mm'.*only in files"),
         ("few laws", manipulator([STEEL]), f"elasticity.*1 for each of {C}"),
         ("gravity", manipulator(STEEL, gravity=(0.0, NAN, 0.0)), r"gravity: entry \[1\] is nan"),
+        ("mask", lambda: ARM.at(np.ma.masked_less(np.zeros(ARM.nv), 1.0)), "q: has a mask"),
         ("no cables", manipulator(cables=()), "cables: none given.*at least one"),
         ("cables a number", lambda: ARM.with_cables(5), "cables: .*list or tuple of Cable"),  # type: ignore[arg-type]
         ("one name", manipulator(cables=[ARM.cables[0]] * 2), "cable 'cable1_1'.*used twice"),
