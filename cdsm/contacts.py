@@ -345,7 +345,9 @@ def _compiled() -> Callable[..., None]:
     for function in (tangent, wrap, _after, _sweep, settle):
         register_jitable(function)
     try:
-        compiled: Callable[..., None] = njit(cache=True, nogil=True)(_settle_postures)
+        compiled: Callable[..., None] = njit(cache=True, nogil=True, error_model="numpy")(
+            _settle_postures
+        )
     except RuntimeError:
         compiled = njit(nogil=True)(_settle_postures)
     return compiled

@@ -56,7 +56,7 @@ class Pattern(NamedTuple):
     source: list[int]  # of each node among the E entries of all paths, P arrivals, P departures
 
 
-class _Row(NamedTuple):
+class Row(NamedTuple):
     """Pulleys that follow each other between two sites."""
 
     start: int  # entries of the sites among those of all paths
@@ -76,6 +76,10 @@ class Wraps:
         radius: r of each pulley (P,) [m].
         groove: Whether each pulley has a groove (P,).
         entry: Each pulley among the E entries of all paths that have a place on a link (P,).
+        row: Row of the joint that moves each entry (E,); the base is 0.
+        point: Position of each entry in the frame of this joint (E, 3) [m].
+        local_axis: Axis of each pulley in this frame (P, 3).
+        rows: Pulleys that follow each other between two sites.
     """
 
     body: RigidBody
@@ -84,10 +88,10 @@ class Wraps:
     radius: Array
     groove: Flags
     entry: Indices
-    _row: Indices
-    _point: Array
-    _axis: Array
-    _rows: tuple[_Row, ...]
+    row: Indices
+    point: Array
+    local_axis: Array
+    rows: tuple[Row, ...]
 
     @classmethod
     def of(cls, body: RigidBody, cables: Sequence[Cable]) -> Self:
@@ -102,7 +106,7 @@ class Wraps:
         axes: list[Array] = []
         pulleys: list[Pulley] = []
         entries: list[int] = []
-        runs: list[_Row] = []
+        runs: list[Row] = []
         for cable in cables:
             start = 0
             first = len(pulleys)
@@ -116,7 +120,7 @@ class Wraps:
                     entries.append(len(rows))
                 else:
                     if len(pulleys) > first:
-                        runs.append(_Row(start, len(rows), first, len(pulleys)))
+                        runs.append(Row(start, len(rows), first, len(pulleys)))
                     start = len(rows)
                     first = len(pulleys)
                 rows.append(row)
@@ -128,10 +132,10 @@ class Wraps:
             radius=frozen(np.array([pulley.radius for pulley in pulleys])),
             groove=frozen(np.array([pulley.groove for pulley in pulleys], np.bool_)),
             entry=frozen(np.array(entries, np.intp)),
-            _row=frozen(np.array(rows, np.intp)),
-            _point=frozen(np.column_stack([np.array(points), np.ones(len(points))])),
-            _axis=frozen(np.array(axes)),
-            _rows=tuple(runs),
+            row=frozen(np.array(rows, np.intp)),
+            point=frozen(np.array(points)),
+            local_axis=frozen(np.array(axes)),
+            rows=tuple(runs),
         )
         for run in runs:
             wraps._check(run)
@@ -142,8 +146,8 @@ class Wraps:
 
         Raises InvalidInput, which names the pulley, if the cable cannot run over it.
         """
-        entry = np.einsum("exy,ey->xe", placement[self._row, :3], self._point)
-        axis = np.einsum("pxy,py->xp", placement[self._row[self.entry], :3, :3], self._axis)
+        entry = np.einsum("exy,ey->xe", placement[self.row, :3], self._homogeneous)
+        axis = np.einsum("pxy,py->xp", placement[self.row[self.entry], :3, :3], self.local_axis)
         points = entry.T.tolist()
         contacts = self._settle(points, axis.T.tolist())
         pattern = self.pattern(tuple(contacts.touches))
@@ -203,11 +207,15 @@ class Wraps:
             [0.0] * P,
             [True] * P,
         )
-        for start, end, low, high in self._rows:
+        for start, end, low, high in self.rows:
             outcome, pulley = settle(points[start], points[end], low, high, pulleys, contacts)
             if outcome != TOUCHES:
                 raise self.fault(outcome, pulley)
         return contacts
+
+    @cached_property
+    def _homogeneous(self) -> Array:
+        return np.column_stack([self.point, np.ones(len(self.point))])
 
     @cached_property
     def _constants(self) -> tuple[list[float], list[bool], list[int]]:
@@ -271,7 +279,7 @@ class Wraps:
         arrival: list[int] = []
         before: list[int] = []
         source: list[int] = []
-        E = len(self._row)
+        E = len(self.row)
         P = len(self.pulleys)
         place = 0  # entries of paths
         number = 0  # pulleys
@@ -283,8 +291,8 @@ class Wraps:
                 if isinstance(element, Sheath):
                     guided = True
                     continue
-                row = int(self._row[place])
-                point = self._point[place, :3]
+                row = int(self.row[place])
+                point = self.point[place]
                 if not isinstance(element, Pulley):
                     on_rim = last >= 0 and self._on_rim(place, pulley[last])
                     nodes.append(Node(row, point, linked=not (guided or on_rim)))
@@ -324,21 +332,21 @@ class Wraps:
     def _on_rim(self, site: int, pulley: int) -> bool:
         """Return whether a site is on the surface of a pulley of the same link."""
         radial, _ = self._offset(site, pulley)
-        same = self._row[site] == self._row[self.entry[pulley]]
+        same = self.row[site] == self.row[self.entry[pulley]]
         return bool(same and abs(radial - self.radius[pulley]) <= SURFACE)
 
     def _offset(self, entry: int, pulley: int) -> tuple[float, float]:
         """Return distance from the axis, and height, of an entry on the same link as a pulley."""
-        apart = self._point[entry, :3] - self._point[self.entry[pulley], :3]
-        axis = self._axis[pulley]
+        apart = self.point[entry] - self.point[self.entry[pulley]]
+        axis = self.local_axis[pulley]
         height = float(axis @ apart)
         return float(np.linalg.norm(apart - height * axis)), height
 
-    def _check(self, row: _Row) -> None:
+    def _check(self, row: Row) -> None:
         """Refuse what is wrong with a row of pulleys at any posture."""
         pulleys = range(row.low, row.high)
         for site, pulley in ((row.start, row.low), (row.end, row.high - 1)):
-            if self._row[site] != self._row[self.entry[pulley]]:
+            if self.row[site] != self.row[self.entry[pulley]]:
                 continue
             radial, height = self._offset(site, pulley)
             cable, label = self.label(pulley)
@@ -352,8 +360,8 @@ class Wraps:
                 raise InvalidInput(f"cable {cable!r}", message)
         for first, second in pairwise(pulleys):
             places = self.entry[[first, second]]
-            parallel = abs(self._axis[first] @ self._axis[second]) > 1.0 - 1e-9
-            if self._row[places[0]] == self._row[places[1]] and parallel:
+            parallel = abs(self.local_axis[first] @ self.local_axis[second]) > 1.0 - 1e-9
+            if self.row[places[0]] == self.row[places[1]] and parallel:
                 apart, _ = self._offset(int(places[1]), first)
                 if apart < self.radius[first] + self.radius[second] - SURFACE:
                     cable, label = self.label(second)

@@ -60,7 +60,7 @@ class Chunk:
         self._kernels = kernels
         self._part = part
         self._scratch = scratch
-        self._table = tables_of(rows.arm)
+        self._table = tables_of(rows.arm, rows.touches)
         self._names = set(rows.names)
         self._q = rows.q[part]
         self._width = width if kernels.COMPILED else len(self._q)
@@ -193,6 +193,8 @@ class Chunk:
                 self._read(values, wanted, doubtful, terms, terms.sum(axis=1), at)
             return values
         terms = self._terms(by_all_joints, F, k, W)
+        if self._rows.shifts is not None:
+            terms[:, 0] += self._rows.shifts(self._one_by_one(F), self._part)
         values = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
         values["joint"] = terms.sum(axis=1)
         if wanted:
@@ -204,6 +206,7 @@ class Chunk:
         return (
             self._kernels.COMPILED
             and self._table.coupling is None
+            and self._rows.shifts is None
             and self._names.isdisjoint(TERMS)
             and wanted <= {"along"}
         )

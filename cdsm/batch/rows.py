@@ -86,9 +86,8 @@ _KERNELS = frozenset(("gravity", "springs"))  # terms of an arm that the kernels
 
 
 def without_kernel(arm: Manipulator) -> list[str]:
-    """Return the names of the terms, and of the parts, of an arm that no kernel computes."""
-    lacking = [term.name for term in arm.terms if term.name not in _KERNELS]
-    return [*lacking, "pulleys"] if arm.wraps else lacking
+    """Return the names of the terms of an arm that no kernel computes."""
+    return [term.name for term in arm.terms if term.name not in _KERNELS]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -109,6 +108,8 @@ class Rows:
         cable_stiffness: That of each row; by default that of the arm's cables.
         check_limits: Whether rows beyond the joint limits are skipped.
         status: :class:`Status` (N,) of rows that are lost already; by default none is.
+        touches: Which pulleys touch in all rows (P,); None: not known, or there are none.
+        shifts: What shifts of contacts add to H_L·F (n, nv, nv) under F (n, C) in a slice of rows.
     """
 
     arm: Manipulator
@@ -122,6 +123,8 @@ class Rows:
     cable_stiffness: CableStiffness | None = None
     check_limits: bool = True
     status: Codes | None = None
+    touches: tuple[bool, ...] | None = None
+    shifts: Callable[[Array, slice], Array] | None = None
 
 
 class ArmTables:
@@ -134,12 +137,14 @@ class ArmTables:
         dimensions: Those of the arm: a :class:`BodyArrays` without axes of blocks and postures.
     """
 
-    def __init__(self, arm: Manipulator) -> None:
+    def __init__(self, arm: Manipulator, touches: tuple[bool, ...] | None = None) -> None:
         if lacking := without_kernel(arm):
             remedy = "use stiffness() posture by posture."
             raise InvalidInput("arm", f"batches have no kernel for {listed(lacking)}; {remedy}")
         tree = arm.body.arrays()
         routing = arm.routing
+        if arm.wraps is not None and touches is not None:
+            routing = arm.wraps.pattern(touches).routing
         parent = tree.parent[1:]
         n = len(parent)
         self.coupling = arm.body.coupling
@@ -215,9 +220,9 @@ class ArmTables:
 
 
 @lru_cache(maxsize=16)
-def tables_of(arm: Manipulator) -> ArmTables:
-    """Return the arrays of an arm, which are made once."""
-    return ArmTables(arm)
+def tables_of(arm: Manipulator, touches: tuple[bool, ...] | None = None) -> ArmTables:
+    """Return the arrays of an arm, made once; of cables that touch these of the pulleys."""
+    return ArmTables(arm, touches)
 
 
 def side_by_side(values: Array, width: int) -> Array:

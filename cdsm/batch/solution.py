@@ -21,6 +21,7 @@ import numpy as np
 from cdsm.batch.chunk import Chunk, Scratch
 from cdsm.batch.quantities import Codes, shapes_of
 from cdsm.batch.rows import ArmTables, Rows, tables_of
+from cdsm.batch.wrapped_rows import solve_wrapped
 from cdsm.support.values import Array
 
 # numbers of the poses of a chunk, compiled and by numpy, where a chunk has one block; 64 postures
@@ -152,7 +153,9 @@ def _source() -> Path:
 
 def solve_rows(rows: Rows, threads: int = 1) -> tuple[dict[str, Array], Codes]:
     """Compute the quantities of all rows by name (N, …), and the status (N,) of each row."""
-    table = tables_of(rows.arm)
+    if rows.arm.wraps is not None and rows.touches is None:
+        return solve_wrapped(rows, threads, solve_rows)
+    table = tables_of(rows.arm, rows.touches)
     count = len(rows.q)
     kernels = choose_kernels(table, count)
     width = 32 if rows.arm.nv >= 80 else 64

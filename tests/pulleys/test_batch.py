@@ -1,0 +1,71 @@
+"""Batches of arms with pulleys against single postures, in every pattern of pulleys that touch."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.batch import wrapped_rows
+from tests.support.pulleys import finger
+
+OUTPUTS = ("joint", "active", "passive", "cable_lengths", "length_jacobian", "along", "tip")
+REACH = np.array([0.1, 1.2, 1.2, 1.2])
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize(
+    "arm",
+    [finger(), finger(plane=False), finger(plane=False, groove=False)],
+    ids=["in the plane", "beside grooves", "smooth"],
+)
+def test_rows_are_postures(
+    arm: cdsm.Manipulator, compiled: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if compiled:
+        monkeypatch.setattr(wrapped_rows, "_PLAIN", 0)
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-REACH, REACH, (60, 4))
+    q[:30, 0] = 0.0
+    F = rng.uniform(5.0, 30.0, (60, 9))
+    batch = cdsm.evaluate(arm, q, F, outputs=OUTPUTS, direction="z")
+    patterns = set()
+    for i in range(60):
+        try:
+            pose = arm.at(q[i])
+        except cdsm.InvalidInput as error:
+            assert batch.status[i] == error.status
+            continue
+        patterns.add(tuple(pose.wraps.touches.tolist()))
+        K = cdsm.stiffness(pose, F[i])
+        expected: dict[str, Any] = {
+            "joint": K.joint,
+            "active": K.active,
+            "passive": K.passive,
+            "cable_lengths": pose.cable_lengths,
+            "length_jacobian": pose.length_jacobian,
+            "tip": pose.tip,
+        }
+        for name, value in expected.items():
+            size = max(abs(value).max(), 1e-3)
+            np.testing.assert_allclose(batch[name][i], value, rtol=0.0, atol=1e-12 * size)
+        if batch.status[i] == cdsm.Status.OK:
+            assert batch["along"][i] == pytest.approx(K.along("z"), rel=1e-9)
+    assert len(patterns) > 10
+
+
+def test_distributed_tensions_and_sweeps_know_pulleys() -> None:
+    arm = finger().with_springs({"to_l3": 0.5, "to_l2": 0.5, "to_l1": 0.5})
+    q = np.random.default_rng(3).uniform(0.0, 0.5, (5, 4)) * [0.0, 1.0, 1.0, 1.0]
+    pull = cdsm.distribute_tensions(arm, q, minimum=1.0)
+    for i in range(5):
+        single = cdsm.distribute_tension(arm.at(q[i]), minimum=1.0)
+        np.testing.assert_allclose(pull.values[i], single.values, rtol=0.0, atol=1e-9)
+
+
+def test_the_report_compares_with_a_batch() -> None:
+    arm = finger(plane=False).with_springs({f"to_l{k}": 0.5 for k in range(4)})
+    pose = arm.at([0.1, 0.3, 0.2, 0.1])
+    report = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0)).report()
+    assert "not possible" not in str(report)
+    assert "FAIL" not in str(report)
