@@ -19,11 +19,14 @@ if TYPE_CHECKING:
     from cdsm.sweeps.poses import PoseSet
 
 
+_TARGET = "Wanted stiffness; without it, the range of stiffness is the answer."
+
+
 def plan(
     arm: options.ArmArgument,
     direction: Annotated[str, opt("Direction of the stiffness, such as -y.", "AXIS|X,Y,Z")],
     changes: options.SetOption = None,
-    target: Annotated[float | None, opt("Wanted stiffness.", "N/mm", min=0.0)] = None,
+    target: Annotated[float | None, opt(_TARGET, "N/mm", min=0.0)] = None,
     angles: options.AnglesOption = None,
     path: options.PathOption = None,
     max_change_per_sample: Annotated[float, opt("Of a tension, along --path.", "N")] = math.inf,
@@ -37,7 +40,8 @@ def plan(
 ) -> int:
     """Find the least tensions that give a wanted stiffness.
 
-    At a posture the answer also has the range of stiffness, along a path the tensions of each line.
+    At a posture the answer also has the range of stiffness, and without --target only this range,
+    which --figure draws; along a path it has the tensions of each line.
 
     Exit code 0; 3 if no tensions reach the target at the posture, or at some samples of the path.
     The plan of the other samples is still written.
@@ -45,8 +49,8 @@ def plan(
     u = options.parse_direction(direction)
     wanted = None if target is None else 1e3 * target
     if path is None:
-        if wanted is None:
-            raise misuse("--target", "give it, or --path.")
+        if wanted is None and out is not None:
+            raise misuse("--out", "is of a plan: give --target.")
         if max_change_per_sample < math.inf:
             raise misuse("--max-change-per-sample", "needs --path.")
         from cdsm.planning.plan import checked_targets, plan_within
@@ -57,8 +61,13 @@ def plan(
         pose = options.posture(arm, changes, angles)
         direction_of_tip = unit_direction("direction", u)
         wrench = options.load_at_tip(pose.arm, load, mass)
-        stiffness_target = checked_targets(wanted, ())
         space = TensionSpace(pose, direction_of_tip, minimum, maximum, wrench)
+        if wanted is None:
+            attainable = range_within(space)
+            write_picture(figure, attainable.plot)
+            head, numbers = header(pose, [minimum])
+            return answer(as_json, numbers | attainable.to_dict(), head, attainable)
+        stiffness_target = checked_targets(wanted, ())
         attainable = range_within(space)
         best = plan_within(space, direction_of_tip, stiffness_target)
         write(out, best.write)
@@ -102,6 +111,8 @@ def _one_target(target: float | None, file_target: Array | None) -> float | Arra
     raise misuse("--target", problem)
 
 
+_MINIMA = "Lower bounds of all tensions [N], a case each; with --angles, points of the curve."
+_COLOUR = "Colour of the workspace in --figure, default softest; with --angles, the curve: along."
 _GRID = "Grid of joint angles [deg, or mm where they slide]: first, last and number, or one angle; "
 _GRID += "other joints stay at 0."
 _ALONG = "Direction of along and payload, such as -y; default: x, y and z."
@@ -114,10 +125,11 @@ def sweep_postures(
     arm: options.ArmArgument,
     out: Annotated[Path | None, file_opt("Table to write, SI.", "FILE.nc|csv", "--out")] = None,
     changes: options.SetOption = None,
+    angles: options.AnglesOption = None,
     grid: Annotated[str | None, opt(_GRID, "JOINT=LOW:HIGH:N,...")] = None,
     path: Annotated[Path | None, opt(options.OF_JOINTS, "PATH.csv")] = None,
     random: Annotated[int | None, opt("Sobol points within the joint limits.", "N", min=1)] = None,
-    minimum: Annotated[str, opt("Lower bounds of all tensions [N], a case each.", "N,...")] = "0",
+    minimum: Annotated[str, opt(_MINIMA, "N,...")] = "0",
     maximum: options.MaximumOption = math.inf,
     load: options.LoadOption = None,
     direction: Annotated[str | None, opt(_ALONG, "AXIS|X,Y,Z")] = None,
@@ -128,36 +140,47 @@ def sweep_postures(
         Path | None, opt("Keeps what is done; a stopped sweep resumes.", "FOLDER")
     ] = None,
     figure: options.FigureOption = None,
-    quantity: Annotated[str, opt("Colour of the workspace in --figure.", "NAME")] = "softest",
+    quantity: Annotated[str | None, opt(_COLOUR, "NAME")] = None,
     as_json: options.JsonOption = False,
 ) -> int:
-    """Compute the stiffness over many postures; write a table, a map.
+    """Compute the stiffness over many postures, or over the tension at one; write a table, a map.
 
-    The table has an entry with a status for each posture and each lower bound of the tensions.
+    The table has an entry with a status for each posture and each lower bound of the tensions. The
+    text has quantiles, and says why postures have no tensions. With --angles and several lower
+    bounds, it is the stiffness over the tension, and --figure draws the curve.
 
     Exit code 0; 3 if no entry has the status ok, or the map is empty.
     """
-    if out is None and figure is None and store is None:
-        raise misuse("--out", "give --out, --figure or --store: where the answer goes.")
-    if figure is None and quantity != "softest":
-        raise misuse("--quantity", "is of --figure; give both.")
     from cdsm.support.status import status_names
     from cdsm.support.validation import XYZ
     from cdsm.sweeps.cases import DEFAULT
     from cdsm.sweeps.files import write_sweep
+    from cdsm.sweeps.infeasible import explain_infeasible
+    from cdsm.sweeps.poses import joint_angles
     from cdsm.sweeps.store import read_into_memory
+    from cdsm.sweeps.summary import curve_lines, quantile_lines
 
-    robot = options.load_arm(arm, changes)
     low = options.parse_numbers("--minimum", minimum)
+    at_one = angles is not None
+    if out is None and figure is None and store is None and not at_one:
+        raise misuse("--out", "give --out, --figure or --store: where the answer goes.")
+    if figure is None and quantity is not None:
+        raise misuse("--quantity", "is of --figure; give both.")
+    if at_one and figure is not None and len(low) < 2:
+        raise misuse("--minimum", "a curve over the tension needs several, such as 5,10,20,40.")
+    shown = quantity or ("along" if at_one else "softest")
+    robot = options.load_arm(arm, changes)
     names = [*DEFAULT] if outputs is None else [name.strip() for name in outputs.split(",")]
     if figure is not None:
-        names = [*dict.fromkeys([*names, "tip_position", quantity])]
+        names = [*dict.fromkeys([*names, *(() if at_one else ("tip_position",)), shown])]
+    postures = _postures(robot, angles, grid, path, random)
+    wrench = options.load_at_tip(robot, load)
     dataset = cdsm.sweep(
         robot,
-        _postures(robot, grid, path, random),
-        minimum=low[0] if len(low) == 1 else low,
+        postures,
+        minimum=low[0] if len(low) == 1 and not at_one else low,
         maximum=maximum,
-        wrench=options.load_at_tip(robot, load),
+        wrench=wrench,
         direction=XYZ if direction is None else options.parse_direction(direction),
         outputs=names,
         worst_friction=worst_friction,
@@ -176,12 +199,25 @@ def sweep_postures(
     entries = sum(counts.values())
     if not counts.get("ok"):
         warnings.append(f"no posture could be evaluated: {listed}")
+    lines += curve_lines(dataset.isel(pose=0)) if at_one else quantile_lines(dataset)
+    least = min(low)
+    status = status.reshape(-1, len(low))[:, low.index(least)]
+    causes = None
+    if len(status) <= _EXPLAINED:
+        q = joint_angles(robot, postures)
+        worst = worst_friction
+        causes = explain_infeasible(robot, q, status, least, maximum, wrench, worst_friction=worst)
+    if causes is not None:
+        lines.append(f"{causes}" + (f" (least tension {least:g} N)" if len(low) > 1 else ""))
     if figure is not None:
-        write_picture(figure, lambda: cdsm.plots.plot_map(dataset, quantity))
-        if bool(dataset[quantity].isnull().all()):
-            warnings.append(f"{quantity} exists at none of {entries} entries")
+        draw = cdsm.plots.plot_tension_curve if at_one else cdsm.plots.plot_map
+        write_picture(figure, lambda: draw(dataset, shown))
+        if bool(dataset[shown].isnull().all()):
+            warnings.append(f"{shown} exists at none of {entries} entries")
     lines += [f"written: {file}" for file in written]
     results: Json = {"entries": counts, "written": written}
+    if causes is not None:
+        results["infeasible_postures"] = causes.to_dict()
     return answer(as_json, numbers | results, head, "\n".join(lines), warnings=warnings)
 
 
@@ -202,12 +238,21 @@ def _diameter(arm: cdsm.Manipulator, diameter: float | None, outputs: list[str])
     return known
 
 
+_EXPLAINED = 2**20  # most postures whose status is explained
+
+
 def _postures(
-    arm: cdsm.Manipulator, grid: str | None, path: Path | None, random: int | None
+    arm: cdsm.Manipulator,
+    angles: str | None,
+    grid: str | None,
+    path: Path | None,
+    random: int | None,
 ) -> PoseSet | Array:
     """Build the set of postures from the one option that is given."""
-    if sum(option is not None for option in (grid, path, random)) != 1:
-        raise misuse("--grid, --path, --random", "give one of them.")
+    if sum(option is not None for option in (angles, grid, path, random)) != 1:
+        raise misuse("--angles, --grid, --path, --random", "give one of them.")
+    if angles is not None:
+        return options.joint_coordinates(angles, arm)[None]
     if grid is not None:
         return _grid(grid, arm)
     if path is not None:

@@ -189,7 +189,7 @@ def _start(
     (before, h) = offsets
     (radius, outer, limit) = sizes
     # with a limit of its own, holes may still meet at its end
-    stops = joint.limit is None or limit >= 2.0 * math.atan(joint.disk_offset / radius)
+    stops = joint.limit is None or limit >= 2.0 * math.atan2(joint.disk_offset, radius)
     chain.at = k
     bends = link.bending_stiffness is not None
     if not joint.axes:

@@ -27,7 +27,14 @@ from cdsm.plots.planning import plot_saturation as plot_saturation
 from cdsm.plots.planning import plot_shares as plot_shares
 from cdsm.plots.planning import plot_stiffness_plan as plot_stiffness_plan
 from cdsm.plots.planning import plot_stiffness_range as plot_stiffness_range
-from cdsm.plots.planning import plot_stiffness_ranges
+from cdsm.plots.planning import plot_stiffness_ranges, plot_tension_curve
 from cdsm.plots.style import save_figure
 
-__all__ = ["plot_arm", "plot_map", "plot_path", "plot_stiffness_ranges", "save_figure"]
+__all__ = [
+    "plot_arm",
+    "plot_map",
+    "plot_path",
+    "plot_stiffness_ranges",
+    "plot_tension_curve",
+    "save_figure",
+]

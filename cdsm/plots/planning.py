@@ -14,10 +14,14 @@ from cdsm.errors import InvalidInput
 from cdsm.planning.range import StiffnessRange
 from cdsm.plots import style
 from cdsm.plots.style import N_PER_MM
-from cdsm.support.validation import instance
+from cdsm.quantities import QUANTITIES, display_of, si_of
+from cdsm.support.status import check_sweep
+from cdsm.support.validation import instance, one_of
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
+    import xarray
+
     from cdsm.planning.path_plan import PathPlan
     from cdsm.planning.plan import StiffnessPlan
     from cdsm.planning.sensitivity import Saturation
@@ -97,6 +101,43 @@ def plot_saturation(saturation: Saturation) -> Figure:
         axes.axvline(saturation.stiffest, color=style.GREEN, linestyle="-.", label=label)
     axes.legend(loc="lower right")
     return style.titled(figure, saturation.posture.arm.name)
+
+
+@style.styled
+def plot_tension_curve(dataset: xarray.Dataset, quantity: str = "along") -> Figure:
+    """Plot a quantity of a sweep at one posture against the least tension that held.
+
+    Args:
+        dataset: Result of :func:`~cdsm.sweep` of one posture with several ``minimum``.
+        quantity: A quantity with one number, or one for each direction; by default the stiffness
+            ``along``. Gaps are where it does not exist; the text of the sweep says why.
+
+    Raises:
+        InvalidInput: ``dataset`` is no sweep, or has several postures, wrenches or only one
+            minimum. It has no such quantity, or that has more numbers.
+    """
+    check_sweep(dataset)
+    curve = dataset[one_of("quantity", quantity, map(str, dataset.data_vars))].squeeze(drop=True)
+    rows = curve.transpose("minimum", ...) if "minimum" in curve.dims else curve
+    if rows.dims not in (("minimum",), ("minimum", "direction")):
+        problem = f"{quantity} has the dimensions {', '.join(map(str, rows.dims)) or 'none'}"
+        remedy = "one posture, one wrench and several minimum are needed, and one number each."
+        raise InvalidInput("dataset", f"{problem}; {remedy}")
+    held = dataset["minimum_held"].values.min(axis=-1)
+    order = np.argsort(held, kind="stable")
+    unit, size = display_of(si_of(curve.units))
+    figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.6)
+    values = rows.values.reshape(len(held), -1)[order] / size
+    labels = dataset["direction"].values.tolist() if rows.ndim == 2 else [quantity]
+    for k, (label, column) in enumerate(zip(labels, values.T, strict=True)):
+        axes.plot(held[order], column, ".-", color=style.COLORS[k % 7], label=f"{label}")
+    axes.set_xlabel("least tension of every cable [N]")
+    words = QUANTITIES[quantity].words.removesuffix(" along a direction")
+    axes.set_ylabel(f"{words} [{unit}]" if unit.strip("1") else words)
+    style.from_zero(axes, values)
+    if rows.ndim == 2:
+        axes.legend(title="along")
+    return style.titled(figure, str(dataset.attrs["title"]).rpartition(" of ")[2])
 
 
 @style.styled

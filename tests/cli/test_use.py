@@ -44,7 +44,7 @@ COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
         ("weigh PROBE", 2, "give it or --mass"),
         ("weigh PROBE --minimum 30 --load 0,0,1,0,1,0", 2, "a weight is a force"),
         ("buckle PROBE --minimum 5", 2, "--load or --mass"),
-        ("plan PROBE --direction z", 2, "give it, or --path"),
+        ("plan PROBE --direction z", 0, "the stiffness can be"),
         ("plan PROBE --direction z --target 3 --max-change-per-sample 1", 2, "needs --path"),
         ("sweep PROBE --random 5", 2, "where the answer goes"),
         ("sweep PROBE --out s.csv", 2, "give one of them"),
