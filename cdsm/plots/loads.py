@@ -26,7 +26,10 @@ _HALF = 0.5  # the stiffness axis begins at zero if values are below this part o
 
 @style.styled
 def plot_weight_test(test: WeightTest) -> Figure:
-    """Plot load [N] against tip displacement [mm], nonlinear and linear, and tensions [N]."""
+    """Plot load [N] against tip displacement [mm], nonlinear and linear, and tensions [N].
+
+    Dotted lines are the events on the way.
+    """
     figure, ((left, right),) = style.panels(style.TWO_COLUMNS, 3.0, 2)
     loads = np.concatenate([[0.0], test.loads])
     moved = MM * np.vstack([np.zeros(3), test.displacements])
@@ -41,6 +44,12 @@ def plot_weight_test(test: WeightTest) -> Figure:
     style.cable_lines(right, loads, tensions, arm.cables.names)
     right.set(xlabel="load [N]", ylabel="tension at each motor [N]")
     right.set_ylim(bottom=0.0)
+    for event in test.events:
+        for mark in (left.axhline, right.axvline):
+            mark(event.load, color="0.5", linewidth=0.7, linestyle=":", zorder=0)
+    names = dict.fromkeys(event.kind for event in test.events)
+    if names:
+        right.set_xlabel(f"load [N]; dotted: {', '.join(names)}")
     left_it = "; left its reference before the weight" if test.left_reference else ""
     return style.titled(
         figure, f"{arm.name}: weight of {np.linalg.norm(test.force):.4g} N{left_it}"

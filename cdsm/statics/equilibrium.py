@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.posture import Posture
+from cdsm.statics.events import Event, events_text
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import NEUTRAL, Balance, Point, settle
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.format import aligned, coordinates, without_rounding
+from cdsm.support.format import aligned, coordinates, plural, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import Direction, instance, unit_direction, wrench_vector
 from cdsm.support.values import Array, draw, frozen
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
     from cdsm.stiffness_matrix import Report
 
+_LISTED = 6  # most joints at stops that a print lists; more are counted
+_LOCKED = 1e6  # a direction is locked if it is so many times stiffer than the softest axis
 _NEUTRAL = 1e-2  # smallest eigenvalue over the magnitudes of its terms: they cancel, to 1 %
 
 
@@ -48,6 +51,9 @@ class Equilibrium(Result):
         motors: ``"locked"``: they hold the lengths, so the elasticity of the cables counts in K_θ;
             ``"tension"``: they hold the tensions (:func:`~cdsm.forward_statics`).
         branch: Share of load and pull up to which the arm followed without a jump; 1: all of it.
+        events: What happened on the way there, in the order of the loads: cables that go slack or
+            pass their maximum, joints that reach their stops, a loss of stability. Empty if load
+            and pull acted at once.
     """
 
     _headline = "moved"
@@ -61,6 +67,7 @@ class Equilibrium(Result):
     model: LockedArm
     motors: Literal["locked", "tension"] = field(default="locked", metadata=unit("1"))
     branch: float = field(default=1.0, metadata=unit("1"))
+    events: tuple[Event, ...] = field(default=(), metadata=unit("1"))
 
     @property
     def pose(self) -> Posture:
@@ -229,6 +236,13 @@ class Equilibrium(Result):
         """
         return self.stiffness.tip_response(unit_direction("direction", direction), self._free)[0]
 
+    def _along_axes(self) -> str:
+        """Return the stiffness along x, y, z [N/mm] as text; of a locked direction no number."""
+        values = [self.along(u) / 1e3 for u in "xyz"]
+        least = min(values)
+        texts = [f"{k:.4g}" if k < _LOCKED * least else "locked" for k in values]
+        return f"({', '.join(texts)})"
+
     def plot(self) -> Figure:
         """Plot the arm in mm at the reference (grey) and at the equilibrium."""
         return draw("plot_path", [self.reference, self.pose])
@@ -242,16 +256,20 @@ class Equilibrium(Result):
             state = "slack" if cable.name in self.slack else state
             rows.append((cable.name, f"{F:.3f}", f"{F0:.3f}", state))
         moved = coordinates(without_rounding(1000.0 * self.displacement))
-        lines = [*aligned(rows), f"tip moved by {moved} mm"]
-        lines += [
-            f"{arm.joint_names[i]} rests on its stop, which pushes with "
-            f"{self.stop_torque[i]:.4g} {arm.torque_unit(i)}"
-            for i in np.flatnonzero(self.stop_torque).tolist()
-        ]
-        if self.at_limit:
+        lines = [*aligned(rows), f"tip moved by {moved} mm", *events_text(self.events)]
+        stopped = np.flatnonzero(self.stop_torque).tolist()
+        if len(stopped) > _LISTED:
+            lines.append(f"{len(stopped)} of {plural(arm.nv, 'joint')} rest on their stops")
+        else:
+            lines += [
+                f"{arm.joint_names[i]} rests on its stop, which pushes with "
+                f"{self.stop_torque[i]:.4g} {arm.torque_unit(i)}"
+                for i in stopped
+            ]
+        if stopped:
             with suppress(SingularStiffness):
-                k = coordinates([self.along(u) / 1e3 for u in "xyz"])
-                lines.append(f"stiffness along x, y, z, that joint fixed: {k} N/mm")
+                fixed = "that joint" if len(stopped) == 1 else "those joints"
+                lines.append(f"stiffness along x, y, z, {fixed} fixed: {self._along_axes()} N/mm")
         lines.append(
             "motors hold lengths: the elasticity of the cables counts in the stiffness"
             if self.motors == "locked"
@@ -301,7 +319,9 @@ def settled(arm: LockedArm, start: Posture, reached: float = 0.0) -> Point:
     return settle(Balance(arm.at, arm.reference, arm.at_pose(start)), start.q, reached)
 
 
-def as_equilibrium(arm: LockedArm, point: Point, branch: float = 1.0) -> Equilibrium:
+def as_equilibrium(
+    arm: LockedArm, point: Point, branch: float = 1.0, events: tuple[Event, ...] = ()
+) -> Equilibrium:
     """Return a solution as an Equilibrium; ElasticityRangeError if a tension is outside its law."""
     position = arm.reference.arm.cables.position_controlled
     return Equilibrium(
@@ -312,4 +332,5 @@ def as_equilibrium(arm: LockedArm, point: Point, branch: float = 1.0) -> Equilib
         model=arm,
         motors="tension" if arm.tension_held or not position.any() else "locked",
         branch=branch,
+        events=events,
     )

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.continuation import Model, follow
+from cdsm.statics.continuation import Model, follow, stage_at
 from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, settled
+from cdsm.statics.events import events_on, watched
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.stiffness_matrix import checked_tension
 from cdsm.support.format import place
@@ -79,11 +80,16 @@ def forward_statics(
         return as_equilibrium(loaded, settled(loaded, begin))
     _require_held(model(0.0), home)
     here = settled(model(0.0), home)
-    last, branch = follow(model, here.state.pose, here.stop_torque, 0.0, 1.0)
-    here = last or here
-    if branch < 1.0:
-        here = settled(loaded, here.state.pose, branch)
-    return as_equilibrium(loaded, here, branch)
+    branch = follow(model, stage_at(model, here.state.pose, here.stop_torque, 0.0), 1.0)
+    force = float(np.linalg.norm(W[:3]))
+    events = events_on(model, branch, watched(model(0.0)), force, 1.0)
+    last = branch[-1]
+    reached = 1.0
+    here = last.point
+    if last.share < 1.0:
+        reached = events[-1].share
+        here = settled(loaded, last.pose, reached)
+    return as_equilibrium(loaded, here, reached, events)
 
 
 def home_angles(arm: Manipulator) -> Array:

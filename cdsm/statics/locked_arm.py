@@ -57,6 +57,7 @@ class LockedArm:
         L = reference.cable_lengths
         self.rest_length: Array | None = None  # motors that hold tensions hold no length
         self._laws: list[_LockedLaw] = []
+        self._taut: NDArray[np.bool_] | None = None  # which cables stay taut; None: where F ≥ 0
         if tension_held:
             return
         originals = laws.original_lengths(L, tension)
@@ -104,11 +105,33 @@ class LockedArm:
         lengths = pose.cable_lengths if self.tension_held else self.rest_length
         return assemble(pose, frozen(F), self.wrench, frozen(k), free_length=lengths)
 
+    def continued_tensions(self, pose: Posture) -> Array:
+        """Compute F (C,) [N] at a posture, negative where the wire of a cable is too long.
+
+        Below 0 N it is the tension of a wire that could push: where it is 0, a cable goes slack.
+        """
+        F = self.tension.copy()
+        for held in self._laws:
+            F[held.cables] = held.continued_tension(pose.cable_lengths[held.cables])[0]
+        return F
+
+    def keeping(self, taut: NDArray[np.bool_]) -> LockedArm:
+        """Return the arm whose cables stay taut, and could push, or stay slack, as ``taut`` (C,).
+
+        It has no kink where a cable goes slack, and is the arm itself up to there.
+        """
+        other = copy(self)
+        other._taut = taut
+        return other
+
     def _tensions(self, pose: Posture) -> tuple[Array, Array]:
         F = self.tension.copy()
         k = np.zeros(self.tension.size)
-        for locked in self._laws:
-            F[locked.cables], k[locked.cables] = locked.tension(pose.cable_lengths[locked.cables])
+        for held in self._laws:
+            pull, slope = held.continued_tension(pose.cable_lengths[held.cables])
+            taut = pull >= 0.0 if self._taut is None else self._taut[held.cables]
+            F[held.cables] = np.where(taut, pull, 0.0)
+            k[held.cables] = np.where(taut, 1.0 / slope, 0.0)
         return F, k
 
 
@@ -131,8 +154,8 @@ class _LockedLaw(NamedTuple):
         wire = self.rest_length * (strain - self.strain)
         return wire + (inside - self.start) * self.series + (F - inside) * slope, slope
 
-    def tension(self, lengths: Array) -> tuple[Array, Array]:
-        """Compute F [N] and dF/dL [N/m] at lengths L [m]."""
+    def continued_tension(self, lengths: Array) -> tuple[Array, Array]:
+        """Compute F [N], also below 0 N, and dL/dF [m/N] at lengths L [m]."""
         wanted = lengths - self.length
         ends = np.full((2, lengths.size), [[-_HUGE], [_HUGE]])
 
@@ -140,8 +163,7 @@ class _LockedLaw(NamedTuple):
             reached, slope = self.elongation(F)
             return reached - wanted, slope
 
-        F, slope = newton_in_bracket(error, self.start, *ends)
-        return np.maximum(F, 0.0), np.where(F < 0.0, 0.0, 1.0 / slope)
+        return newton_in_bracket(error, self.start, *ends)
 
 
 def require_domain(

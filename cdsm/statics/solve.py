@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from copy import copy
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -107,6 +108,16 @@ class Balance:
         """Return P(x): the scaled angles between the stops."""
         return np.minimum(np.maximum(x, self._lower), self._upper)
 
+    def gaps(self, x: Array) -> Array:
+        """Return the way to both stops (2, nv), lower and upper, scaled; below 0: they push."""
+        return np.array([x - self._lower, self._upper - x])
+
+    def under(self, at: Callable[[Array], ArmState]) -> Balance:
+        """Return the normal map of another model between the same stops."""
+        other = copy(self)
+        other._at = at
+        return other
+
     def attempt(self, x: Array) -> Point | None:
         """Return f(x); None where the model does not exist, as where two sites coincide."""
         try:
@@ -158,6 +169,14 @@ def stable_between(at: Callable[[Array], ArmState], before: Array, after: Array)
         if np.linalg.eigvalsh(K + K.T)[0] <= 0.0:
             return False
     return True
+
+
+def least_eigenvalue(f: Balance, point: Point) -> float:
+    """Return the smallest eigenvalue of the symmetric part of K, scaled, of the free joints."""
+    free = ~point.out
+    if not free.any():
+        return math.inf
+    return float(np.linalg.eigvalsh(_symmetric(f, point)[np.ix_(free, free)])[0])
 
 
 def _descend(

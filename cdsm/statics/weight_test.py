@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.posture import Posture
-from cdsm.statics.continuation import follow
+from cdsm.statics.continuation import Model, Stage, follow, stage_at
 from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, equilibrium
+from cdsm.statics.events import Event, Watched, events_on, events_text, watched
 from cdsm.statics.load_cycle import LoadHistory, load_cycle
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.stiffness_matrix.prints import frictionless_model
@@ -44,6 +45,8 @@ class WeightTest(Result, Plotted):
         breakaway: Load in the direction of the weight below which no cable slides, and the hole
             that slides first; None for an arm without friction.
         history: States with friction; load 0 is the arm without the weight. None without friction.
+        events: What changes how the arm carries the weight, in the order of the loads; with
+            friction where there is some.
     """
 
     _headline = "stiffness"
@@ -55,6 +58,7 @@ class WeightTest(Result, Plotted):
     states: tuple[Equilibrium, ...]
     breakaway: Breakaway | None = None
     history: LoadHistory | None = None
+    events: tuple[Event, ...] = field(default=(), metadata=unit("1"))
 
     @property
     def _posture(self) -> Posture:
@@ -145,7 +149,10 @@ class WeightTest(Result, Plotted):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences if, without the weight, the arm leaves its reference, or is not stable."""
+        """Sentences if the arm leaves its reference or is not stable without the weight, or snaps.
+
+        It snaps where it buckles, and comes to rest nearby.
+        """
         sentences = list[str]()
         history = self.history
         if self.left_reference:
@@ -160,6 +167,10 @@ class WeightTest(Result, Plotted):
             sentences.append(f"LEFT ITS REFERENCE: {left}")
         if not self.unloaded.stable:
             sentences.append("NEUTRAL: before the weight, not every joint is brought back")
+        snaps = [event for event in self.events if event.kind == "buckling"]
+        sentences += [
+            f"SNAPS THROUGH: at {event.load:.4g} N {event.place} moves" for event in snaps
+        ]
         return (*sentences, *(history.warnings if history else ()))
 
     def __str__(self) -> str:
@@ -173,6 +184,7 @@ class WeightTest(Result, Plotted):
             f"stiffness along the force: measured {self.stiffness / 1e3:.4g} N/mm, "
             f"linear {self.tangent / 1e3:.4g} N/mm",
             f"(linear is {model}; measured the secant over this weight)",
+            *events_text(self.events),
             *self._about_friction(),
         ]
         if self.unloaded.at_limit:
@@ -259,19 +271,20 @@ def weight_test(
     def model(share: float) -> LockedArm:
         return unloaded.model.under(frozen(W + share * added))
 
+    size = float(np.linalg.norm(force))
+    watch = watched(unloaded.model)
+    here = stage_at(model, unloaded.pose, unloaded.stop_torque, 0.0)
+    branch = [here]
     for i in range(steps):
-        here = states[-1]
         goal = (i + 1) / steps
-        point, reached = follow(model, here.pose, here.stop_torque, i / steps, goal)
-        here = as_equilibrium(model(reached), point) if point else here
-        if reached < goal:
-            worst = int(abs(here.stiffness.critical_direction).argmax())
-            joint = pose.arm.joint_names[worst]
-            load = reached * np.linalg.norm(force)
-            problem = f"the arm buckles at {100.0 * reached:.4g} % of the load, under {load:.4g} N"
-            raise EquilibriumError(f"{problem}: {joint} buckles", here.residual, reached, joint)
-        states.append(here)
-    test = WeightTest(force=force, unloaded=unloaded, states=tuple(states[1:]))
+        way = follow(model, here, goal)
+        branch += way[1:]
+        here = way[-1]
+        if here.share < goal:
+            raise _buckled(model, branch, watch, size)
+        states.append(as_equilibrium(model(goal), here.point))
+    events = events_on(model, branch, watch, size, 1.0)
+    test = WeightTest(force=force, unloaded=unloaded, states=tuple(states[1:]), events=events)
     if math.isinf(test.frictionless) and math.isfinite(test.tangent):
         problem = f"{np.abs(force).max():.3g} N moves the tip by rounding only; hang at least "
         raise InvalidInput("force", f"{problem}{_MEASURED * pose.arm.length * test.tangent:.1g} N.")
@@ -283,4 +296,15 @@ def weight_test(
         states=test.states,
         breakaway=breakaway(held, unloaded.reference_tension, force, W),
         history=load_cycle(pose, tension, W + np.arange(steps + 1)[:, None] / steps * added),
+    )
+
+
+def _buckled(model: Model, branch: list[Stage], watch: Watched, force: float) -> EquilibriumError:
+    """Return the error of an arm that buckles before it bears ``force`` [N]."""
+    *events, end = events_on(model, branch, watch, force, 1.0)
+    before = f" ({'; '.join(map(str, events))})" if events else ""
+    problem = f"the arm buckles at {100.0 * end.share:.4g} % of the load, under {end.load:.4g} N"
+    residual = branch[-1].point.state.residual
+    return EquilibriumError(
+        f"{problem}: {end.place} buckles{before}", residual, end.share, end.place
     )

@@ -1,0 +1,268 @@
+"""Events while a load grows: what changes how an arm carries it, found as roots.
+
+Each event has a quantity that changes its sign there: the tension of a cable that goes slack, the
+way of a joint to its stop, the smallest eigenvalue of K_θ. A step whose ends differ in sign is
+searched by Brent's method, with the equilibrium solved anew at each trial. A quantity that only
+dips below zero within a step is noticed by the cubic through its ends and their slopes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from typing import Final, Literal, NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.statics.continuation import (
+    Model,
+    Stage,
+    end_of_branch,
+    equilibrium_near,
+    rate,
+)
+from cdsm.statics.locked_arm import LockedArm
+from cdsm.statics.solve import Point
+from cdsm.support.values import Array
+
+Kind = Literal["slack", "slip", "stop", "maximum", "law", "buckling"]
+
+_WORDS: Final[dict[Kind, str]] = {
+    "slack": "{} goes slack",
+    "slip": "{} begins to slide",
+    "stop": "{} reaches its stop",
+    "maximum": "{} passes its maximum tension",
+    "law": "{} leaves the domain of its law",
+    "buckling": "the arm buckles, {} most",
+}
+_ROUNDING = 1e-9  # a quantity below this part of its scale is zero
+_NEAR = 1e-9  # distance of both sides of an event, as a part of the step
+_JUMP = 1e4  # a quantity jumps at an event if it changes there by more than so many roundings
+_DEPTH = 4  # most halvings of a step in which a quantity may dip below zero
+_RATE = 1e-6  # change of the share for a difference
+_PRECISION = 1e-15  # of shares, relative to their step
+
+
+@final
+@dataclass(frozen=True)
+class Event:
+    """What changes how an arm carries a growing load, and the load at which it does.
+
+    Attributes:
+        kind: ``"slack"``: a cable loses its tension; ``"slip"``: a cable begins to slide in a hole
+            in which it stuck; ``"stop"``: a joint reaches its limit; ``"maximum"``: a tension
+            passes the largest one of its cable; ``"law"``: a tension leaves the domain of the law
+            of its wire; ``"buckling"``: K_θ is no longer positive definite.
+        place: Name of the cable, joint or hole; for buckling, of the joint that moves most.
+        share: Share of the load (and pull) [-]; of a load cycle, the number of the load, counted
+            as its rows are: 2.5 is half-way between loads 2 and 3, −1 the reference.
+        load: Magnitude of the growing force [N]; 0 if no force grows.
+    """
+
+    kind: Kind
+    place: str
+    share: float
+    load: float
+
+    def __str__(self) -> str:
+        where = f"at {self.load:.4g} N" if self.load else f"at {100.0 * self.share:.4g} % of it"
+        where = where if self.share else "at once"
+        return f"{_WORDS[self.kind].format(self.place)} {where}"
+
+    def to_dict(self) -> dict[str, object]:
+        """Return it for JSON: the load in N."""
+        entries = asdict(self)
+        entries["load_N"] = entries.pop("load")
+        return entries
+
+
+_SHOWN = 8  # most events in a text
+
+
+def events_text(events: Sequence[Event], about: str = "on the way") -> list[str]:
+    """Return a line that names the events, or nothing if there are none."""
+    words = [str(event) for event in events[:_SHOWN]]
+    if len(events) > _SHOWN:
+        words.append(f"and {len(events) - _SHOWN} more events")
+    return [f"{about}: {'; '.join(words)}"] if words else []
+
+
+class Watched(NamedTuple):
+    """Quantities (m,) that become negative at an event, what they are, and their scales."""
+
+    kinds: tuple[Kind, ...]
+    places: tuple[str, ...]
+    value: Callable[[Stage], Array]
+    scale: Callable[[Stage], Array]
+
+
+def watched(arm: LockedArm, maximum: Array | None = None) -> Watched:
+    """Return what an arm without friction is watched for, while its load grows.
+
+    ``maximum`` (C,) [N] are the largest tensions; None: the cables' own.
+    """
+    cables = arm.reference.arm.cables
+    names = cables.names
+    joints = arm.reference.arm.joint_names
+    most = np.array([cable.maximum for cable in cables]) if maximum is None else maximum
+    laws = [cable.elasticity for cable in cables]
+    held = cables.position_controlled & (not arm.tension_held)
+    stretched = np.flatnonzero(held)
+    limited = np.flatnonzero(np.isfinite(most))
+    low = np.array([law.low for law in laws])
+    high = np.array([law.high for law in laws])
+    begun = np.flatnonzero(held & (low > 0.0))
+    ended = np.flatnonzero(held & np.isfinite(high))
+    cables_of: tuple[tuple[Kind, NDArray[np.intp]], ...] = (
+        ("slack", stretched),
+        ("maximum", limited),
+        ("law", begun),
+        ("law", ended),
+    )
+    kinds: list[Kind] = [kind for kind, indices in cables_of for _ in indices]
+    places = [names[c] for _, indices in cables_of for c in indices]
+    kinds += ["stop"] * (2 * len(joints))
+    places += [*joints, *joints]
+
+    def value(stage: Stage) -> Array:
+        locked = stage.arm
+        F = locked.continued_tensions(stage.pose)
+        gaps = stage.balance.gaps(stage.point.x).ravel()
+        parts = F[stretched], (most - F)[limited], (F - low)[begun], (high - F)[ended], gaps
+        return np.concatenate(parts)
+
+    def scale(stage: Stage) -> Array:
+        size = max(float(abs(stage.point.state.tension).max(initial=0.0)), 1e-300)
+        count = len(kinds) - 2 * len(joints)
+        return np.append(np.full(count, size), np.ones(2 * len(joints)))
+
+    return Watched(tuple(kinds), tuple(places), value, scale)
+
+
+def events_on(
+    model: Model, branch: Sequence[Stage], watch: Watched, force: float, goal: float
+) -> tuple[Event, ...]:
+    """Locate the events on a branch of equilibria, in the order of their loads.
+
+    If the branch ends before the share ``goal``, the last event is the loss of stability. ``force``
+    [N] is the growing force at the share 1.
+    """
+    events = list[Event]()
+    for here, there in pairwise(branch):
+        events += _within(model, here, there, watch, force)
+    last = branch[-1]
+    if last.share < goal:
+        events += _at_end(model, last, watch, force)
+    order = sorted(events, key=lambda event: (event.share, event.kind == "buckling"))
+    return tuple(replace(event, load=abs(event.load)) for event in order)
+
+
+def _at_end(model: Model, last: Stage, watch: Watched, force: float) -> list[Event]:
+    """Return the events from the last stable equilibrium of a branch to its end, and this one."""
+    names = last.pose.arm.cables.names
+    end = end_of_branch(model, last)
+    stage = last if end is None else end.stage
+    slack = [] if end is None else end.slack
+    events = [Event("slack", names[c], share, share * force) for c, share in slack]
+    joint = buckling_joint(stage.point, stage.pose.arm.joint_names)
+    share = max(stage.share, last.share)
+    return [*events, Event("buckling", joint, share, share * force)]
+
+
+def buckling_joint(point: Point, names: Sequence[str]) -> str:
+    """Return the joint that moves most in the softest motion of the joints off their stops."""
+    K = point.state.stiffness
+    free = np.flatnonzero(~point.out)
+    if not free.size:
+        free = np.arange(len(K))
+    motion = np.linalg.eigh((K + K.T)[np.ix_(free, free)])[1][:, 0]
+    return names[int(free[abs(motion).argmax()])]
+
+
+def _within(
+    model: Model, here: Stage, there: Stage, watch: Watched, force: float, depth: int = _DEPTH
+) -> list[Event]:
+    """Return the events between two equilibria of a branch."""
+
+    def at(share: float) -> Stage:
+        stage = equilibrium_near(model, share, here) or equilibrium_near(model, share, there)
+        return stage or there
+
+    dip = _dip(model, here, there, watch) if depth else None
+    if dip is not None:
+        middle = equilibrium_near(model, dip, here)
+        if middle is not None:
+            return [
+                *_within(model, here, middle, watch, force, depth - 1),
+                *_within(model, middle, there, watch, force, depth - 1),
+            ]
+    return _crossings(at, here, there, watch, force)
+
+
+def _crossings(
+    at: Callable[[float], Stage], here: Stage, there: Stage, watch: Watched, force: float
+) -> list[Event]:
+    """Return the events where quantities become negative between two equilibria of a branch."""
+    from scipy.optimize import brentq  # slow to import
+
+    low = here.share
+    high = there.share
+    before = watch.value(here)
+    after = watch.value(there)
+    none = _ROUNDING * watch.scale(here)
+    events = list[Event]()
+    stages = {low: before, high: after}
+
+    def values(share: float) -> Array:
+        if share not in stages:
+            stages[share] = watch.value(at(share))
+        return stages[share]
+
+    for i in np.flatnonzero((before >= -none) & (after < -none)).tolist():
+        share = low
+        if before[i] > none[i]:
+            share = brentq(
+                lambda way, i=i: values(way)[i], low, high, xtol=_PRECISION * (high - low)
+            )
+        events.append(Event(watch.kinds[i], watch.places[i], share, share * force))
+        sides = [max(low, share - _NEAR * (high - low)), min(high, share + _NEAR * (high - low))]
+        if abs(np.diff([values(side)[i] for side in sides])[0]) > _JUMP * none[i]:
+            stage = at(sides[0])  # K_θ without the tension of this cable holds the arm no more
+            joint = buckling_joint(stage.point, stage.pose.arm.joint_names)
+            events.append(Event("buckling", joint, share, share * force))
+    return events
+
+
+def _dip(model: Model, here: Stage, there: Stage, watch: Watched) -> float | None:
+    """Return a share between two equilibria at which a quantity may be negative, or None.
+
+    The quantities are positive at both ends; within, they are the cubics with their slopes.
+    """
+    step = there.share - here.share
+    values = [watch.value(here), watch.value(there)]
+    positive = (values[0] > 0.0) & (values[1] > 0.0)
+    if not positive.any():
+        return None
+    slopes = [_slope(model, stage, watch) * step for stage in (here, there)]
+    suspects = positive & (slopes[0] < 0.0) & (slopes[1] > 0.0)
+    parts = np.linspace(0.0, 1.0, 21)[1:-1, None]
+    cubic = (
+        (1.0 + 2.0 * parts) * (1.0 - parts) ** 2 * values[0]
+        + parts * (1.0 - parts) ** 2 * slopes[0]
+        + parts**2 * (3.0 - 2.0 * parts) * values[1]
+        + parts**2 * (parts - 1.0) * slopes[1]
+    )
+    deep = np.where(suspects, cubic, np.inf).min(axis=1)
+    k = int(deep.argmin())
+    return here.share + float(parts[k, 0]) * step if deep[k] < 0.0 else None
+
+
+def _slope(model: Model, stage: Stage, watch: Watched) -> Array:
+    """Compute the derivatives (m,) of the quantities by the share along the branch."""
+    x = stage.point.x + _RATE * rate(model, stage)
+    arm = model(stage.share + _RATE)
+    balance = stage.balance.under(arm.at)
+    ahead = Stage(stage.share + _RATE, balance(x), balance, arm)
+    return (watch.value(ahead) - watch.value(stage)) / _RATE
