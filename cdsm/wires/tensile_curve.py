@@ -1,4 +1,4 @@
-"""Choose the loading branch of a tensile test, and fit a curve EA(F) to it.
+"""Fit a curve EA(F) to the loading branch of a tensile test.
 
 ln EA is a spline of the tension, on a scale that is half logarithmic and half linear; the strain is
 the integral of 1/EA. The penalty on the second differences of ln EA is the one of the largest
@@ -7,119 +7,24 @@ restricted likelihood (REML; S. N. Wood, Generalized Additive Models, 2017, sect
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple, NoReturn
+from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import isotonic_regression, least_squares, minimize_scalar
-from scipy.signal import find_peaks
+from scipy.optimize import least_squares, minimize_scalar
 
-from cdsm.errors import InvalidInput
 from cdsm.support.values import Array
+from cdsm.wires.tensile_branch import refuse
 
-FEWEST: Final = 8  # points of a fit; fewer show no bend
-_FALL = 0.1  # a fall of the force by this share of its range ends a loading branch
-_REACHED = 0.95  # share of the largest force that the fitted branch reaches
-_SPLINES = 36  # splines, tensions of the grid, points (more are averaged)
+_SPLINES: Final = 36  # splines, tensions of the grid, points (more are averaged)
 _GRID = 600
 _MOST = 400
 _JUMP = 10.0  # EA over the steepest measured chord; beyond it, the curve has overshot a jump
 _PARTS = 6  # part of the points over which their scatter is averaged
 _FEWEST_NEAR = 20  # fewest points of such an average
 _ROUGHER = 100.0  # smoothing of the fit over that of the curve for the band
-
-
-def refuse(problem: str) -> NoReturn:
-    """Raise InvalidInput: the test cannot be fitted."""
-    raise InvalidInput("tensile test", problem)
-
-
-class Loading(NamedTuple):
-    """Points of the branch that is fitted, in the order recorded."""
-
-    strain: Array  # (n,) [-]
-    force: Array  # (n,) [N]
-    noise: float  # of a force, one σ [N]
-    notes: tuple[str, ...]  # what was left out
-
-
-def loading(strain: Array, force: Array, between: tuple[float, float]) -> Loading:
-    """Choose the last rise to the largest force; leave out slack, lone points and what follows.
-
-    Nothing is sorted or made to rise within it: noise of the displacement would then bias EA.
-    """
-    if len(force) < FEWEST or not np.ptp(strain) or not np.ptp(force):
-        refuse(
-            f"{len(force)} points given; at least {FEWEST} are needed, of which displacement and "
-            "force change."
-        )
-    noise, reach = _noise_and_reach(force)
-    lone = _lone(force) | _lone(strain)
-    strain = strain[~lone]
-    force = force[~lone]
-    if (lowest := force.min()) < -max(6.0 * noise, 5e-3 * reach):
-        refuse(f"{lowest:.4g} N is compression. Tare the load cell, or change the sign.")
-    padded = np.pad(force, 1, constant_values=-np.inf)
-    peaks = find_peaks(padded, prominence=max(_FALL * reach, 8.0 * noise))[0] - 1
-    most = float(force.max())
-    top = _REACHED * min(most, between[1])
-    rise = int(np.flatnonzero(force[peaks] >= top)[-1])
-    first = 0
-    last = peaks[rise] + 1
-    after = len(force) - peaks[rise] - 1
-    if rise:
-        first = peaks[rise - 1] + int(force[peaks[rise - 1] : last].argmin())
-    strain = strain[first:last]
-    force = force[first:last]
-    low = force <= force[: max(3, len(force) // 100)].min() + 4.0 * noise
-    slack = int(np.flatnonzero(low)[-1]) if force[0] <= 8.0 * noise and low.sum() > 2 else 0
-    strain = strain[slack:]
-    force = force[slack:]
-    inside = (force >= between[0]) & (force <= between[1])
-    strain = strain[inside]
-    force = force[inside]
-    in_order = force[np.argsort(strain, kind="stable")]
-    rising = isotonic_regression(in_order).x if len(force) else in_order
-    if len(force) < FEWEST or not np.std(in_order - rising) < 0.1 * np.ptp(rising):
-        narrow = "" if np.isinf(between).all() else f" from {between[0]:g} to {between[1]:g} N"
-        refuse(
-            f"the force does not rise with the displacement in {len(force)} points of loading"
-            f"{narrow}; the largest force is {most:.4g} N. "
-            f"Give {FEWEST} or more in the order recorded; check that the columns belong together."
-        )
-    chord = np.ptp(force) / np.ptp(strain)
-    if np.ptp(strain) > 1.0 or not 1.0 < chord < 1e9:
-        refuse(
-            f"strains to {np.ptp(strain):.3g} and a rigidity of about {chord:.3g} N. Check the "
-            "units of displacement, force and gauge length."
-        )
-    left_out = {
-        "points far from their neighbours left out": lone.sum(),
-        f"points before the last of {len(peaks)} loading branches left out": first,
-        "points after the largest force left out": after,
-        "points before the first load left out": slack,
-        f"points outside {between[0]:g} to {between[1]:g} N left out": (~inside).sum(),
-    }
-    notes = (f"{what}: {count}" for what, count in left_out.items() if count)
-    return Loading(strain, force, noise, tuple(notes))
-
-
-def _noise_and_reach(values: Array) -> tuple[float, float]:
-    """Return one σ of the noise of values in a row, and their range without extremes."""
-    noise = 1.4826 * np.median(abs(np.diff(values, 2))) / np.sqrt(6.0)
-    return float(noise), float(np.ptp(np.quantile(values, (0.02, 0.98))))
-
-
-def _lone(values: Array) -> NDArray[np.bool_]:
-    """Return whether each value is alone and far from its neighbours."""
-    noise, reach = _noise_and_reach(values)
-    least = max(8.0 * noise, 5e-3 * reach, 2.0 * np.median(abs(np.diff(values))))
-    middle = np.median(sliding_window_view(np.pad(values, 1, mode="edge"), 3), axis=1)
-    return np.asarray(abs(values - middle) > least)
 
 
 class Curve(NamedTuple):
@@ -164,8 +69,11 @@ def _local_squares(error: Array, strain: Array) -> Array:
     return squares
 
 
-def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
+def fit_curve(strain: Array, force: Array, noise: float, resolution: float = 0.0) -> Curve:
     """Fit a curve to points with ``noise`` [N] in their forces, and choose its smoothing.
+
+    Steps of a load cell of this ``resolution`` [N] may drift along a ramp, and look like bends of
+    EA: errors below it do not count for the smoothing.
 
     The parameters x are the k coefficients of ln EA and the strain at the stiff end, over the range
     of the strain.
@@ -228,7 +136,7 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
         scale = np.sqrt(np.diag(normal))  # strain and ln EA are orders apart
         factor = cho_factor(normal / np.outer(scale, scale) + 1e-11 * np.eye(k + 1))
         inverse = cho_solve(factor, np.eye(k + 1)) / np.outer(scale, scale)
-        left = r @ r + n * (1e-6 * reach) ** 2
+        left = r @ r + n * max(1e-6 * reach, resolution) ** 2
         score = (n - 3) * np.log(left + np.sum((root @ x) ** 2))
         score += 2.0 * np.log(np.diag(factor[0]) * scale).sum() - (k - 2) * np.log(10.0) * power
         return x, float(score), inverse
@@ -262,7 +170,7 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
             "follows it. Look for a wire gripped anew, or units that change midway."
         )
     correlation = float(r[1:] @ r[:-1] / (r @ r or 1.0))
-    if np.std(r) < 1e-4 * reach:  # what is left is no noise
+    if np.std(r) < max(1e-4 * reach, resolution / 2.0):  # what is left is no noise
         correlation = 0.0
     level = splines @ rough[:-1]
     return Curve(tension, grid, np.log(EA), level, np.sqrt(variance + bias**2), correlation)

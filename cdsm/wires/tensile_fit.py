@@ -14,7 +14,8 @@ from cdsm.support.validation import checked_quantity, number_array, scalar
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import TabulatedElasticity
-from cdsm.wires.tensile_curve import FEWEST, Curve, fit_curve, loading, refuse
+from cdsm.wires.tensile_branch import FEWEST, loading, refuse
+from cdsm.wires.tensile_curve import Curve, fit_curve
 from cdsm.wires.tensile_test import TensileTest
 
 _NORMAL: Final = 1.959963984540054  # quantile of the normal distribution for 95 %
@@ -22,6 +23,7 @@ _EXACT: Final = 1e-4  # error of ln EA without noise: from the grid, and from th
 _ENOUGH: Final = 41  # points that tell the scatter
 _YIELD: Final = 0.8  # EA below this share of its plateau is plastic
 _STEP: Final = 1.25  # ratio of tensions for d ln EA/d ln F; a smaller one takes noise for slope
+_LEAST: Final = 1e3  # EA [N] below which a law is doubted, as of LinearElasticity
 _CERTAIN: Final = 3.0  # standard deviations
 
 
@@ -151,14 +153,17 @@ def fit_tensile_test(
     The forces are fitted by a C1 curve with EA > 0, whose ln EA is a spline. Its smoothness follows
     from the data (restricted likelihood).
 
-    One loading branch is fitted: the last rise of the force that reaches 95 % of the largest force,
-    so cycles that bed the wire in are left out. So are points far from their neighbours, slack, and
-    what follows the largest force; ``notes`` counts them.
+    One loading branch is fitted, the last complete one, so cycles that bed the wire in are left
+    out. It reaches 95 % of the largest force; or it begins near zero and reaches 85 % of the
+    complete branch before it, as peaks relax from cycle to cycle. Points far from their neighbours,
+    slack, holds, and what follows the largest force are left out too; ``notes`` counts them, and
+    names the other branches. What the wire creeps in a hold on the way is taken out.
 
     The law ends where plasticity begins: from there on, EA stays below 0.8 of its plateau, beyond
     its uncertainty. The first stage, pre-tensioning, ends where EA begins to grow slower than √F.
 
-    Wrong units are found only if the strain is above 1 or the rigidity is outside 1 N to 1e9 N.
+    A strain above 1, or a rigidity outside 1 N to 1e9 N, is refused as a wrong unit. A rigidity
+    below 1 kN is doubted in ``notes``: kN, or exchanged columns?
 
     Args:
         displacement: Δl, shape (n,) [m], in the order recorded.
@@ -184,7 +189,7 @@ def fit_tensile_test(
     strain = points.strain
     pull = points.force
     notes = points.notes
-    curve = fit_curve(strain, pull, points.noise)
+    curve = fit_curve(strain, pull, points.noise, points.resolution)
     onset = _yield_onset(curve)
     most = float(pull.max())
     if onset is not None:  # fit again: the yield would distort the curve below it
@@ -198,7 +203,7 @@ def fit_tensile_test(
                 f"the wire yields from {onset:.4g} N on, after {len(pull)} points; {FEWEST} are "
                 "needed. Sample more finely below the yield."
             )
-        curve = fit_curve(strain, pull, points.noise)
+        curve = fit_curve(strain, pull, points.noise, points.resolution)
     if len(pull) < _ENOUGH:
         notes += (
             f"{len(pull)} points, fewer than {_ENOUGH}, give the band: it may miss EA more often",
@@ -209,6 +214,7 @@ def fit_tensile_test(
             "drifts, a grip slips, or EA bends too sharply. The band is too narrow",
         )
     grid, law = _as_law(curve, strain)
+    notes = (*_doubts(float(law.rigidity(grid).max())), *notes)
     low = float(grid[0])
     high = float(grid[-1])
     begin = _pretension_end(curve)
@@ -228,6 +234,16 @@ def fit_tensile_test(
         start=float(np.interp(low, curve.tension, curve.strain)) * length,
         test=TensileTest(frozen(u), frozen(F), length),
         notes=notes,
+    )
+
+
+def _doubts(rigidity: float) -> tuple[str, ...]:
+    """Return a note on the largest rigidity [N] of a law, if hardly any wire has it."""
+    if rigidity >= _LEAST:
+        return ()
+    return (
+        f"EA is {rigidity:.4g} N at most, far too little for a wire: are displacement and force "
+        "exchanged, or is the force in kN?",
     )
 
 

@@ -26,6 +26,11 @@ _MOVED: Final = re.compile(
     r"displacement|extension|elongation|extensometer|stroke|crosshead|position|travel|\bstrain"
 )
 _FORCE: Final = re.compile(r"\b(force|load)\b")
+_MOVED_ABROAD: Final = re.compile(
+    r"weg|dehnung|verlängerung|traverse|hub\b|déplacement|allongement|desplazamiento|alargamiento|"
+    r"elongación|spostamento|allungamento|位移|变形|伸长"
+)
+_FORCE_ABROAD: Final = re.compile(r"kraft|\blast\b|force|effort|fuerza|carga|forza|carico|力|荷重")
 _OTHER: Final = re.compile(r"\b(at|rate|max\w*|speed|limit|time)\b")  # such as "load rate"
 _COMPUTED: Final = re.compile(r"strain.*\((displacement|extension)\)", re.I)
 _BRACKETS: Final = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")
@@ -71,7 +76,7 @@ def read_tensile_csv(
     Args:
         path: The file.
         columns: Names of the columns of displacement (or strain) and force, if the header has other
-            names, or several that fit.
+            names, or several that fit; or their numbers, from ``"1"``, if two have one name.
         units: Their units, if the file has none: ``m``, ``cm``, ``mm``, ``µm`` or ``in``, of a
             strain ``strain``, ``mm/mm`` or ``%``; ``N``, ``mN``, ``cN``, ``daN``, ``kN``, ``MN``,
             ``lbf`` or ``kgf``.
@@ -100,7 +105,11 @@ def read_tensile_csv(
     )
     rows = _rows_of_numbers(sheet, header, (displacement.place, force.place))
     length = _gauge_length(sheet, header) if gauge_length is None else gauge_length
-    source = " and ".join(repr(sheet.rows[header.row][c.place]) for c in (displacement, force))
+    names = sheet.rows[header.row]
+    source = " and ".join(
+        repr(names[c.place]) + f" (column {c.place + 1})" * (names.count(names[c.place]) > 1)
+        for c in (displacement, force)
+    )
     source += f" of line {sheet.lines[header.row]}"
     strained = displacement.unit in _STRAINS
     if length is None:
@@ -179,7 +188,7 @@ def _find_header(sheet: _Sheet, columns: Sequence[str] | None) -> _Header:
         names = sheet.rows[best.row if best else 0] if sheet.rows else []
         sheet.refuse(
             f"has no header that names {' and '.join(columns or ('displacement', 'force'))} in "
-            f"its first {_HEADERS} lines; there are {', '.join(names) or 'none'}; which columns?"
+            f"its first {_HEADERS} lines; there are {', '.join(names) or 'none'}; {_guess(names)}"
         )
     return best
 
@@ -191,7 +200,7 @@ def _find_column(
     names = sheet.rows[header.row]
     if len(places) > 1:
         several = " and ".join(names[place] for place in places)
-        sheet.refuse(f"{several} may both be the {kind}; give one as columns.")
+        sheet.refuse(f"{several} may both be the {kind}; give {_choices(names, header)}.")
     known = _UNITS[kind]
     place = places[0]
     written = [_name_and_unit(names[place])[1], *header.units[place : place + 1]]
@@ -202,6 +211,35 @@ def _find_column(
             f"{unit or 'none'} is given as units; give one of {', '.join(known)}."
         )
     return _Column(place, read, known[read])
+
+
+def _choices(names: list[str], header: _Header) -> str:
+    """Return the columns to give if several columns fit: by name, or by number if two share it."""
+    displacements, forces = header.columns
+    texts = [_name_and_unit(name)[0] or name for name in names]
+    shared = any(texts.count(texts[k]) > 1 for k in (*displacements, *forces))
+    pairs = []
+    for k in range(max(len(displacements), len(forces))):
+        places = displacements[min(k, len(displacements) - 1)], forces[min(k, len(forces) - 1)]
+        pairs.append([f"{place + 1}" if shared else texts[place] for place in places])
+    return _given_as(pairs, " or ")
+
+
+def _guess(names: list[str]) -> str:
+    """Return which columns to give if the header names none in English; ``names`` are its cells."""
+    texts = [_name_and_unit(name)[0] for name in names]
+    moved = [text for text in texts if _MOVED_ABROAD.search(text.lower())]
+    force = [text for text in texts if _FORCE_ABROAD.search(text.lower())]
+    if not moved or not force or moved[0] == force[0]:
+        return "which columns?"
+    return f"give {_given_as([[moved[0], force[0]]], '')}."
+
+
+def _given_as(pairs: list[list[str]], between: str) -> str:
+    """Return pairs of columns as the option of the command and as the argument."""
+    quoted = [[f'"{text}"' if "," in text else text for text in pair] for pair in pairs]
+    options = between.join(f"--columns {','.join(pair)}" for pair in quoted)
+    return f"{options}, or, in Python, columns={tuple(pairs[0])}"
 
 
 def _rows_of_numbers(sheet: _Sheet, header: _Header, places: tuple[int, int]) -> range:
@@ -244,16 +282,20 @@ def _fitting(row: list[str], columns: Sequence[str] | None) -> tuple[list[int], 
     texts = [cell.lower() for cell in row]
     names = [_name_and_unit(cell)[0].lower() for cell in row]
     if columns is not None:
-        displacement, force = (column.strip().lower() for column in columns)
-        return (
-            [k for k, text in enumerate(texts) if displacement in text],
-            [k for k, text in enumerate(texts) if force in text],
-        )
+        displacement, force = (_named(column.strip().lower(), texts) for column in columns)
+        return displacement, force
     places = [k for k, name in enumerate(names) if not _OTHER.search(name)]
     displacements = [k for k in places if _MOVED.search(names[k])]
     # "strain (extension)" is no other gauge than the extension
     measured = [k for k in displacements if not _COMPUTED.search(row[k])]
     return measured or displacements, [k for k in places if _FORCE.search(names[k])]
+
+
+def _named(column: str, texts: list[str]) -> list[int]:
+    """Return the columns that contain a text, or the one of a number from 1 on."""
+    if column.isdecimal() and column not in texts:
+        return [int(column) - 1] if 1 <= int(column) <= len(texts) else []
+    return [k for k, text in enumerate(texts) if column in text]
 
 
 def _name_and_unit(cell: str) -> tuple[str, str]:

@@ -159,7 +159,9 @@ def test_cycles_that_bed_the_wire_in_are_left_out() -> None:
     F = np.linspace(100.0, fit.elasticity.high, 100)
     assert fit.elasticity.high > 375.0
     assert fit.elasticity.rigidity(F) == pytest.approx(20e3, rel=0.02)
-    assert fit.notes == ("points before the last of 6 loading branches left out: 499",)
+    assert fit.notes[0].startswith("branch 6 of 6 loading branches is fitted, 32.44 to 380 N")
+    assert fit.notes[0].count("number") == 5
+    assert fit.notes[1:] == ("points before this branch left out: 499",)
     part = cdsm.fit_tensile_test(test.displacement, test.force, GAUGE, between=(60.0, 300.0))
     assert 60.0 <= part.elasticity.low < 65.0 < 295.0 < part.elasticity.high <= 301.0
     assert part.elasticity.rigidity(part.tension) == pytest.approx(20e3, rel=0.05)
@@ -182,6 +184,85 @@ def test_slack_lone_points_and_rupture_are_left_out_and_repeated_points_averaged
     d, f = np.repeat(displacement[:90], 2), np.repeat(force[:90], 2) + np.tile([1.0, -1.0], 90)
     fit = cdsm.fit_tensile_test(d, f, GAUGE)
     assert fit.elasticity.rigidity([50.0, 700.0]) == pytest.approx(EA, rel=2e-3)
+
+
+HELD = 20e3  # EA [N] of the wires below
+TOP = 300.0  # [N]
+
+
+def held_test(kind: str, dwell: int, cell: float, seed: int) -> tuple[Array, Array]:
+    """Displacement [m] and force [N] of a ramp with a hold of ``dwell`` readings."""
+    random = np.random.default_rng(seed)
+    points = 60
+    ramp = np.linspace(0.0, TOP, points)
+    time = np.arange(1, dwell + 1)
+    at = points // 2 if kind in ("creep", "relaxation") else points
+    force = np.insert(ramp, at, np.full(dwell, ramp[at - 1]))
+    strain = force / HELD
+    hold = slice(at, at + dwell)
+    after = slice(at + dwell, None)
+    slow = 1.0 - np.exp(-time / 20.0)
+    if kind == "ripple":
+        force[hold] += 0.5 * np.sin(time / 3.0)
+    if kind == "creep":
+        strain[hold] += 2e-4 * slow
+        strain[after] += 2e-4 * slow[-1]
+    if kind == "relaxation":
+        force[hold] -= 0.06 * ramp[at - 1] * slow
+        force[after] -= 0.06 * ramp[at - 1] * slow[-1]
+    displacement = GAUGE * strain + 1e-6 * random.normal(size=force.size)
+    force = force + 0.05 * random.normal(size=force.size)
+    return displacement, np.round(force / cell) * cell
+
+
+@pytest.mark.parametrize("kind", ["plain", "ripple", "creep", "relaxation"])
+@pytest.mark.parametrize("cell", [0.1, 1.0])
+@pytest.mark.parametrize("dwell", [1, 10, 300])
+def test_holds_leave_the_rigidity_as_it_is(kind: str, cell: float, dwell: int) -> None:
+    fit = cdsm.fit_tensile_test(*held_test(kind, dwell, cell, dwell), GAUGE)
+    law = fit.elasticity
+    assert law.low < 8.0
+    assert law.high > 0.95 * TOP * (0.97 if kind == "relaxation" else 1.0)
+    np.testing.assert_allclose(fit.rigidity, HELD, rtol=0.03)
+    if kind == "creep" and dwell == 300:
+        assert any("a hold near 147" in note and "is taken out" in note for note in fit.notes)
+
+
+def test_equal_peaks_end_one_branch() -> None:
+    """The largest reading occurs twice, with a smaller one between."""
+    force = np.append(np.arange(0.0, 301.0, 10.0), [299.0, 300.0])
+    fit = cdsm.fit_tensile_test(GAUGE * force / HELD, force, GAUGE)
+    assert (fit.elasticity.low, fit.elasticity.high) == pytest.approx((0.0, 300.0), abs=0.1)
+    np.testing.assert_allclose(fit.rigidity, HELD, rtol=1e-3)
+
+
+@pytest.mark.parametrize("cycles", [2, 5])
+def test_of_cycles_whose_peaks_relax_the_last_is_fitted(cycles: int) -> None:
+    """Each peak relaxes by 6 %, and the wire beds in: EA of the last cycle is 20 kN."""
+    random = np.random.default_rng(cycles)
+    displacement: list[float] = []
+    force: list[float] = []
+    offset = 0.0
+    for cycle in range(cycles):
+        rigidity = HELD * (1.0 if cycle == cycles - 1 else 0.8)
+        ramp = np.linspace(5.0, TOP * 0.94**cycle, 60)
+        down = np.linspace(0.94 * ramp[-1], 5.0, 40)
+        strain = offset + ramp / rigidity
+        displacement += [*strain, *(strain[-1] - (down[0] - down) / 25e3)]
+        force += [*ramp, *down]
+        offset = displacement[-1] - 5.0 / HELD
+    noise = 0.2 * random.normal(size=len(force))
+    fit = cdsm.fit_tensile_test(GAUGE * np.array(displacement), force + noise, GAUGE)
+    np.testing.assert_allclose(fit.rigidity, HELD, rtol=0.03)
+    assert fit.elasticity.high > 0.95 * TOP * 0.94 ** (cycles - 1)
+    assert fit.notes[0].startswith(f"branch {cycles} of {cycles} loading branches is fitted")
+    assert "(number 1)" in fit.notes[0]
+
+
+def test_a_rigidity_that_no_wire_has_is_doubted() -> None:
+    force, displacement = held_test("plain", 1, 0.1, 0)
+    fit = cdsm.fit_tensile_test(displacement / 1e3, 1e3 * force, GAUGE)  # exchanged, mm and N
+    assert "displacement and force exchanged" in fit.notes[0]
 
 
 RAMP = np.linspace(0.0, 0.01, 100)

@@ -88,11 +88,23 @@ def test_of_two_gauges_none_is_chosen_silently() -> None:
     assert ends[0] > 2.0 * ends[1] > 0.0
 
 
+def test_columns_of_one_name_are_told_apart_by_number(tmp_path: Path) -> None:
+    head = "Extension [mm],Load [N],Extension [mm],Load [N]\n"
+    path = written(tmp_path, f"Specimen 1,,Specimen 2,\n{head}0,0,0,0\n1,100,2,300\n")
+    for columns in (None, ("Extension", "Load")):
+        with pytest.raises(cdsm.FileError, match=r"give --columns 1,2 or --columns 3,4"):
+            cdsm.read_tensile_csv(path, columns=columns, **HALF)
+    second = cdsm.read_tensile_csv(path, columns=("3", "4"), **HALF)
+    assert (second.displacement[-1], second.force[-1]) == (2e-3, 300.0)
+    assert "(column 3)" in second.source
+
+
 @pytest.mark.parametrize(
     ("text", "given", "said"),
     [
         ("", {}, "no header that names displacement and force in its first 50 lines"),
         ("weight [N],force [N]\n0,0\n", {}, "there are weight [N], force [N]; which"),
+        ("Zeit [s];Weg [mm];Kraft [N]\n0;0;0\n", {}, "give --columns Weg,Kraft, or, in Python"),
         ("s,F\n0,0\n", {"columns": ("Weg", "F")}, "names Weg and F"),
         ("force [N],load [N],stroke [mm]\n0,0,0\n", {}, "force [N] and load [N] may both"),
         ("displacement,force [N]\n0,0\n", {}, "the displacement 'displacement' in no unit"),
