@@ -105,6 +105,9 @@ class Pulley:
         if not 0.0 <= bearing < 1.0:
             message = f"{bearing:g} given for a {where}; 0 to 1 is needed: μ_bearing r_bearing/r."
             raise InvalidInput("bearing", message)
+        if not self.groove and (friction or bearing):
+            message = f"a smooth {where} has friction; how a cable then shifts along the axis is "
+            raise InvalidInput("friction", message + "not modelled. Give a groove, or no friction.")
         if friction and bearing:
             message = f"a {where} has friction and bearing; give friction for a post that does not "
             raise InvalidInput("bearing", message + "turn, or bearing for a pulley that does.")

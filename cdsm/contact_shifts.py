@@ -269,13 +269,27 @@ class Shifts:
         H = np.tensordot(weight[self.ends.segment], self._added, 1)
         return np.asarray(0.5 * (H + H.T))
 
-    def hessians(self, group: Indices, count: int) -> Array | float:
-        """Compute what shifts add to Σ ∂²ℓ_s of each of ``count`` groups of segments (S,)."""
+    def hessians(self, weight: Array, group: Indices, count: int) -> Array | float:
+        """Compute what shifts add to the same sums of each of ``count`` groups of segments (S,)."""
         if self._added is None:
             return 0.0
         H = np.zeros((count, *self._added.shape[1:]))
-        np.add.at(H, group[self.ends.segment], self._added)
+        segment = self.ends.segment
+        np.add.at(H, group[segment], weight[segment, None, None] * self._added)
         return np.asarray(0.5 * (H + H.transpose(0, 2, 1)))
+
+    @cached_property
+    def turning(self) -> Array:
+        """Rate ∂u/∂θ (3, G, nv) of the direction of each free piece, seen from its first end."""
+        if self._slips is None:
+            return self._pieces.turn
+        # the contact at B moves by η b, the one at A by (η + s σ) b the other way
+        ends = self.ends
+        slip = self._slips.shift * -ends.way[:, None]
+        moved = self._contacts.across[:, :, None] * slip
+        shift = np.zeros_like(self._pieces.turn)
+        np.add.at(shift.transpose(1, 0, 2), ends.piece, moved.transpose(1, 0, 2))
+        return self._pieces.turn + _apply(self._pieces.compliance, shift)
 
     @cached_property
     def wrap(self) -> tuple[Array, Array]:
@@ -288,19 +302,11 @@ class Shifts:
 
         on a helix times cos γ, and −Φ sin γ σ more.
         """
-        x = self._pieces
         ends = self.ends
         T = len(self.radius)
-        normal, across, sine = self._contacts
-        turn = x.turn
-        if self._slips is not None:
-            # the contact at B moves by η b, the one at A by (η + s σ) b the other way
-            moved = across[:, :, None] * (self._slips.shift * -ends.way[:, None])[None]
-            shift = np.zeros_like(turn)
-            np.add.at(shift.transpose(1, 0, 2), ends.piece, moved.transpose(1, 0, 2))
-            turn = turn + _apply(x.compliance, shift)
-        rate = turn[:, ends.piece]
-        rate[:, :T] -= x.turned[:, ends.piece[:T]]
+        normal, _, sine = self._contacts
+        rate = self.turning[:, ends.piece]
+        rate[:, :T] -= self._pieces.turned[:, ends.piece[:T]]
         about = dot(normal[:, :, None], rate)
         about *= (ends.free / np.sqrt(1.0 - sine * sine))[:, None]
         cosine = 1.0 / np.sqrt(1.0 + self.slope**2)

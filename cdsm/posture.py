@@ -108,7 +108,7 @@ class Posture(ReadOnlyState):
         count = len(self.cable_lengths)
         H = routing.hessians(self.spans, one, routing.cable, count)
         if self.wrapping:
-            H = H + self.wrapping.shifts.hessians(routing.cable, count)
+            H = H + self.wrapping.shifts.hessians(one, routing.cable, count)
         return frozen(H)
 
     @cached_property

@@ -18,14 +18,11 @@ import numpy as np
 
 from cdsm.cable import Cable
 from cdsm.cable_laws import CableLaws
+from cdsm.cable_path import Site
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import Indices, Routing, Spans, cross, dot
 from cdsm.support.values import Array, ReadOnlyState, frozen
-
-_NO_PULLEYS = "friction knows no pulleys and sheaths yet."
-
-STRAIGHT = 1e-9
-"""Wrap angle [rad] below which a cable counts as straight in a hole: the angle is rounding."""
+from cdsm.wrapped_segments import STRAIGHT, ChainPaths, Curvature, Lengths
 
 
 @final
@@ -46,6 +43,7 @@ class Chains:
         wrap: :attr:`Site.wrap` of each hole (P,) [rad].
         routing: Routing of the segments, each as a cable of its own.
         laws: Their elasticities.
+        paths: Cables over pulleys and through sheaths; None: there are none.
     """
 
     segments: tuple[Cable, ...]
@@ -57,15 +55,18 @@ class Chains:
     wrap: Array
     routing: Routing
     laws: CableLaws
+    paths: ChainPaths | None = None
 
     @classmethod
     def of(cls, cables: Sequence[Cable], body: RigidBody) -> Self:
         """Divide cables at their holes into segments."""
+        if not all(cable.is_plain for cable in cables):
+            return cls._over_pulleys(cables, body)
         segments: list[Cable] = []
         start = [0]
         holes = []
         for cable in cables:
-            sites = list(cable.only_sites(_NO_PULLEYS))
+            sites = list(cable.only_sites("this is computed elsewhere."))
             if cable.lead > 0.0:
                 x, y, z = sites[0].position
                 sites.insert(0, replace(sites[0], position=(x - cable.lead, y, z)))
@@ -73,10 +74,7 @@ class Chains:
                 among = i + 1 + len(cable.sites) - len(sites)
                 holes.append((len(segments) + i, among, site.friction, site.wrap))
             pairs = list(pairwise(replace(site, friction=0.0, wrap=0.0) for site in sites))
-            first = replace(cable, sites=pairs[0], lead=0.0)
-            # without friction the motor holds the tension of all segments, and none is a spring
-            control = "position" if any(cable.friction) else cable.control
-            rest = replace(first, series_stiffness=math.inf, control=control)
+            first, rest = _springs_of(cable, pairs[0])
             segments += [first, *(replace(rest, sites=pair) for pair in pairs[1:])]
             start.append(len(segments))
         hole, places, friction, wrap = np.array(holes).reshape(-1, 4).T
@@ -90,6 +88,30 @@ class Chains:
             wrap=frozen(wrap.copy()),
             routing=Routing.of(body, segments, every=True),
             laws=CableLaws(tuple(segments), whole=False),
+        )
+
+    @classmethod
+    def _over_pulleys(cls, cables: Sequence[Cable], body: RigidBody) -> Self:
+        """Divide cables of which some run over pulleys or through sheaths."""
+        paths = ChainPaths.of(cables, body)
+        counts = np.bincount(paths.cable, minlength=len(cables))
+        segments: list[Cable] = []
+        for cable, count in zip(cables, counts.tolist(), strict=True):
+            sites = [site for site in cable.sites if isinstance(site, Site)]
+            ends = [replace(site, friction=0.0, wrap=0.0) for site in (sites[0], sites[-1])]
+            first, rest = _springs_of(cable, (ends[0], ends[1]))
+            segments += [first, *[rest] * (count - 1)]
+        return cls(
+            segments=tuple(segments),
+            cable=paths.cable,
+            start=frozen(np.cumsum([0, *counts])),
+            hole=paths.hole,
+            site=paths.place,
+            friction=paths.friction,
+            wrap=paths.wrap,
+            routing=paths.wraps.all_touching.routing,
+            laws=CableLaws(tuple(segments), whole=False),
+            paths=paths,
         )
 
 
@@ -112,7 +134,8 @@ class Segments(ReadOnlyState):
     length_jacobian: Array
     wrap: Array
     wrap_jacobian: Array
-    _spans: Spans
+    _spans: Spans | None = None
+    _curvature: Curvature | None = None
 
     @classmethod
     def at(cls, chains: Chains, twist: Array, placement: Array) -> Self:
@@ -127,6 +150,8 @@ class Segments(ReadOnlyState):
         the cable goes straight through, φ has a kink; there the gradient is 0, the mean of both
         sides.
         """
+        if chains.paths is not None:
+            return cls._over_pulleys(chains, chains.paths.at(twist, placement))
         routing = chains.routing
         spans = routing.spans(twist, routing.sites(placement))
         hole = chains.hole
@@ -154,6 +179,17 @@ class Segments(ReadOnlyState):
             _spans=spans,
         )
 
+    @classmethod
+    def _over_pulleys(cls, chains: Chains, at: Lengths) -> Self:
+        return cls(
+            chains=chains,
+            lengths=frozen(at.length),
+            length_jacobian=frozen(at.jacobian),
+            wrap=frozen(at.wrap + chains.wrap),
+            wrap_jacobian=frozen(at.wrap_jacobian),
+            _curvature=at.curvature,
+        )
+
     @property
     def grip(self) -> Array:
         """Product μ φ of friction coefficient and wrap angle at each hole (P,) [-].
@@ -179,8 +215,23 @@ class Segments(ReadOnlyState):
         It is the cable's part of the active term of K_θ. ``tension`` is T (S,) [N].
         """
         cable = self.chains.cable
-        return frozen(self.chains.routing.hessians(self._spans, tension, cable, int(cable[-1]) + 1))
+        count = int(cable[-1]) + 1
+        if self._curvature is not None:
+            return frozen(self._curvature.hessians(tension, count))
+        assert self._spans is not None
+        return frozen(self.chains.routing.hessians(self._spans, tension, cable, count))
 
     def active(self, tension: Array) -> Array:
         """Compute the active term Σ T_j ∂²l_j/∂θ² (nv, nv) [N m/rad] of all segments."""
+        if self._curvature is not None:
+            return frozen(self._curvature.hessian(tension))
+        assert self._spans is not None
         return frozen(self.chains.routing.hessian(self._spans, tension))
+
+
+def _springs_of(cable: Cable, ends: tuple[Site, Site]) -> tuple[Cable, Cable]:
+    """Return the first segment of a cable, and one of the others, as cables between ``ends``."""
+    first = replace(cable, sites=ends, lead=0.0)
+    # without friction the motor holds the tension of all segments, and none is a spring
+    control = "position" if any(cable.friction) else cable.control
+    return first, replace(first, series_stiffness=math.inf, control=control)

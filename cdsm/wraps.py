@@ -80,6 +80,7 @@ class Wraps:
         point: Position of each entry in the frame of this joint (E, 3) [m].
         local_axis: Axis of each pulley in this frame (P, 3).
         rows: Pulleys that follow each other between two sites.
+        every: Whether segments within one body count as segments.
     """
 
     body: RigidBody
@@ -92,10 +93,11 @@ class Wraps:
     point: Array
     local_axis: Array
     rows: tuple[Row, ...]
+    every: bool
 
     @classmethod
-    def of(cls, body: RigidBody, cables: Sequence[Cable]) -> Self:
-        """Route cables over a body.
+    def of(cls, body: RigidBody, cables: Sequence[Cable], *, every: bool = False) -> Self:
+        """Route cables over a body; with ``every``, segments within one body count as segments.
 
         Raises InvalidInput, with the cable and the pulley: for an unknown link, a site inside a
         pulley of its link or on the rim beside its groove, and neighbouring pulleys of a link that
@@ -134,8 +136,9 @@ class Wraps:
             entry=frozen(np.array(entries, np.intp)),
             row=frozen(np.array(rows, np.intp)),
             point=frozen(np.array(points)),
-            local_axis=frozen(np.array(axes)),
+            local_axis=frozen(np.array(axes).reshape(-1, 3)),
             rows=tuple(runs),
+            every=every,
         )
         for run in runs:
             wraps._check(run)
@@ -313,7 +316,7 @@ class Wraps:
                     number += 1
                 place += 1
             paths.append(nodes)
-        routing = Routing.through(self.body, self.cables, paths)
+        routing = Routing.through(self.body, self.cables, paths, every=self.every)
         segment = {int(node): s for s, node in enumerate(routing.second)}
         return Pattern(
             routing=routing,

@@ -12,12 +12,12 @@ from cdsm.cable import Cable
 from cdsm.cable_laws import group_by_law
 from cdsm.posture import Posture
 from cdsm.routing import Indices
-from cdsm.segments import STRAIGHT
 from cdsm.stiffness_matrix import FrictionState, Stiffness, assemble
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 from cdsm.terms import total
 from cdsm.wires.elasticity import Elasticity
+from cdsm.wrapped_segments import STRAIGHT
 
 Flags = NDArray[np.bool_]
 

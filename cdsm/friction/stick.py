@@ -136,7 +136,7 @@ def breakaway(
         first = pose.arm.cables[chains.cable[chains.hole[hole]]]
         site = int(chains.site[hole]) + 1
         cable = first.name
-        link = first.sites[site - 1].link
+        link = getattr(first.sites[site - 1], "link", "a sheath")
     where: Any = {"cable": cable, "site": site, "link": link}
     return Breakaway(stiffness=K, direction=u, load=load, hole_loads=frozen(loads), **where)
 

@@ -106,6 +106,8 @@ class Shown:
         if pose is None or self.tensions is None or not pose.arm.has_friction:
             return np.empty((0, 2, 3)), np.empty((0, 2, 3))
         chains = pose.segments.chains
+        if chains.paths is not None:  # holes of pulleys and sheaths have no marks yet
+            return np.empty((0, 2, 3)), np.empty((0, 2, 3))
         sticks = can_stick(pose)
         slides = np.zeros_like(sticks) if self.sliding is None else self.sliding
         where = zip(chains.cable[chains.hole], chains.site, strict=True)

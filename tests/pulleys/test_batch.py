@@ -31,11 +31,11 @@ def test_rows_are_postures(
     batch = cdsm.evaluate(arm, q, F, outputs=OUTPUTS, direction="z")
     patterns = set()
     for i in range(60):
-        try:
-            pose = arm.at(q[i])
-        except cdsm.InvalidInput as error:
-            assert batch.status[i] == error.status
+        if batch.status[i] == cdsm.Status.COINCIDENT_SITES:
+            with pytest.raises(cdsm.InvalidInput):
+                arm.at(q[i])
             continue
+        pose = arm.at(q[i])
         patterns.add(tuple(pose.wraps.touches.tolist()))
         K = cdsm.stiffness(pose, F[i])
         expected: dict[str, Any] = {
