@@ -137,7 +137,7 @@ def interval(
         if not math.isfinite(problem.cost(x)):
             x[others] = best[others]
         if others.size and u != best[i]:
-            x = problem.search(x, others, coarse=True)
+            x = problem.search(x, others, profile=True)
         if not math.isfinite(problem.cost(x)):
             return math.inf
         delta = problem.cost(x) - least

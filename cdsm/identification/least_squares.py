@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,20 +20,24 @@ from cdsm.identification.measurement import (
     tension_before,
 )
 from cdsm.identification.tip_position import TipPosition
+from cdsm.identification.warm_starts import LoopPaths, WarmStarts
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
+from cdsm.statics.quasi_static import EquilibriumPath
+from cdsm.support.progress import progress_bar
 from cdsm.support.validation import instance
 from cdsm.support.values import Array
 from cdsm.tension import Tension
 
-NONE: Final[Mapping[object, Posture]] = {}
 TensionOf = Callable[..., Tension | ArrayLike]
 Test = Measurement | WeightLoop | TipPosition
 
 _DECADES = 100.0  # bounds that are positive and this factor apart: the logarithm is searched
 _STEP = 1e-6  # of finite differences
 _STEP_OF_RESTS = 1e-5  # the same of postures at rest, which are less exact
-_FALL = (1e-12, 1e-6), (1e-6, 1e-5)  # of χ², at which a search ends: fine, coarse; with loops
+_FALL = 1e-12, 1e-6  # of χ², at which a search ends; of a profile
+_FALL_OF_RESTS = 1e-6, 1e-5  # the same with postures at rest
+_FALL_OF_LOOPS = 1e-4, 1e-5  # the same with loops, each prediction of which takes long
 _INSIDE = 1e-2  # nearest start to a bound: a search that starts on a bound may stay there
 
 
@@ -40,6 +46,8 @@ class Prediction(NamedTuple):
 
     arm: Manipulator
     numbers: list[Array]  # of each measurement
+    rests: Mapping[object, Posture]  # where the arm rests at tip positions, by their conditions
+    paths: LoopPaths
 
 
 class LeastSquares:
@@ -63,9 +71,20 @@ class LeastSquares:
         self._by_log = (self.low > 0.0) & (self.high >= _DECADES * self.low)
         self._ends = self._scaled(self.low), self._scaled(self.high)
         self._last: tuple[bytes, Prediction | str] = b"", ""
-        self._rests = dict[object, Posture]()  # of tips at the last point, by their conditions
+        self._warm_starts = WarmStarts(np.full(len(bounds), 0.5), {})
+        self._advance: Callable[[int], None] | None = None  # of the bar that counts predictions
         self.edge = ""  # where the model did not exist last, and why
         self.has_rests = not all(isinstance(entry, Measurement) for entry in measurements)
+        self.has_loops = any(isinstance(entry, WeightLoop) for entry in measurements)
+
+    @contextmanager
+    def counted(self, description: str) -> Iterator[None]:
+        """Show a bar with the number of predictions that are made inside this context."""
+        try:
+            with progress_bar(description) as self._advance:
+                yield
+        finally:
+            self._advance = None
 
     def _scaled(self, values: Array) -> Array:
         return np.asarray(np.log(values, out=values.copy(), where=self._by_log))
@@ -97,17 +116,18 @@ class LeastSquares:
         Raises InvalidInput if a function of the user fails.
         """
         if self._last[0] != x.tobytes():
-            rests = dict[object, Posture]()
-            self._last = (x.tobytes(), self._predict(x, rests))
-            self._rests = rests
+            self._last = (x.tobytes(), self._predict(x))
             if isinstance(reason := self._last[1], str):
                 self.edge = f"{self.describe(x)}: {reason}"
         return self._last[1]
 
     def _predict(
-        self, x: Array, rests: dict[object, Posture], near: Mapping[object, Posture] = NONE
+        self, x: Array, near: Mapping[object, Posture] = MappingProxyType({})
     ) -> Prediction | str:
-        """Predict at a point; put in ``rests`` where the arm rests, sought from those ``near``."""
+        """Predict at a point; where the arm rests at tip positions is sought from ``near``."""
+        known = self._warm_starts.at(x)
+        rests = dict[object, Posture]()
+        paths = dict[int, tuple[EquilibriumPath, ...]]()
         parameters = dict(zip(self.names, self.values(x).tolist(), strict=True))
         where = "model_of: "
         numbers = list[Array]()
@@ -129,7 +149,11 @@ class LeastSquares:
                     tension = tension_before(measurement, pose)
                 else:
                     tension = self.tension_of(pose, measurement, **parameters)
-                numbers.append(measurement.predict(pose, tension))
+                if isinstance(measurement, WeightLoop):
+                    moved, paths[i] = measurement.follow(pose, tension, known.get(i, ()))
+                    numbers.append(moved)
+                else:
+                    numbers.append(measurement.predict(pose, tension))
         except CdsmError as error:
             return f"{where}{error}"
         except Exception as error:
@@ -137,7 +161,9 @@ class LeastSquares:
             remedy = "Correct it, narrow the bounds, or let it raise a CdsmError where there is no"
             fault = f"fails at {self.describe(x)}: {error!r}."
             raise InvalidInput(name, f"{fault} {remedy} such arm.") from error
-        return Prediction(arm, numbers)
+        if self._advance:
+            self._advance(1)
+        return Prediction(arm, numbers, rests, paths)
 
     def weighed(self, numbers: Sequence[Array]) -> Array:
         """Return the residuals r (n,) of predicted ``numbers``."""
@@ -145,9 +171,11 @@ class LeastSquares:
         errors = (measurement.errors(predicted) for measurement, predicted in pairs)
         return np.concatenate([off / std for off, std in errors])
 
-    def residuals(self, x: Array, *, beside: bool = False) -> Array:
-        """Compute r (n,) at a point, or one ``beside`` the last; inf without a model."""
-        prediction = self._predict(x, {}, self._rests) if beside else self.predict(x)
+    def residuals(self, x: Array) -> Array:
+        """Compute r (n,) at a point; inf without a model."""
+        return self._weighed_or_inf(self.predict(x))
+
+    def _weighed_or_inf(self, prediction: Prediction | str) -> Array:
         if isinstance(prediction, str):
             count = sum(measurement.readings.size for measurement in self.measurements)
             return np.full(count, np.inf)
@@ -164,6 +192,9 @@ class LeastSquares:
         A side beyond a bound or without a model is left out. Raises InvalidInput if both are.
         """
         here = self.residuals(x)
+        prediction = self.predict(x)
+        assert not isinstance(prediction, str)
+        self._warm_starts = WarmStarts(x.copy(), prediction.paths)
         columns = []
         step = _STEP_OF_RESTS if self.has_rests else _STEP
         for i in range(x.size) if over is None else over:
@@ -171,10 +202,15 @@ class LeastSquares:
             for way in (step, -step):
                 y = x.copy()
                 y[i] += way
-                if 0.0 <= y[i] <= 1.0 and np.isfinite(r := self.residuals(y, beside=True)).all():
-                    sides.append((way, r))
-                    if not central:
-                        break
+                if not 0.0 <= y[i] <= 1.0:
+                    continue
+                side = self._predict(y, prediction.rests)
+                if isinstance(side, str):
+                    continue
+                self._warm_starts.beside[i] = way, side.paths
+                sides.append((way, self.weighed(side.numbers)))
+                if not central:
+                    break
             if not sides:
                 raise InvalidInput(
                     "free",
@@ -185,8 +221,11 @@ class LeastSquares:
             columns.append((r_a - r_b) / (a - b))
         return np.column_stack(columns)
 
-    def search(self, x: Array, over: Any = None, *, coarse: bool = False) -> Array:
-        """Search from a point x for the least χ²; only the parameters ``over`` move, or all."""
+    def search(self, x: Array, over: Any = None, *, profile: bool = False) -> Array:
+        """Search from a point x for the least χ²; only the parameters ``over`` move, or all.
+
+        The search of a ``profile``, which follows others nearby, ends at a fall of its own.
+        """
         moving = np.arange(x.size) if over is None else np.asarray(over)
 
         def at(part: Array) -> Array:
@@ -197,14 +236,15 @@ class LeastSquares:
         start = np.clip(x[moving], _INSIDE, 1.0 - _INSIDE)
         if not np.isfinite(self.cost(at(start))):
             return x  # the model ends here
+        falls = _FALL_OF_LOOPS if self.has_loops else _FALL_OF_RESTS if self.has_rests else _FALL
         solution = least_squares(
             lambda part: self.residuals(at(part)),
             start,
             lambda part: self.jacobian(at(part), moving),
             bounds=(0.0, 1.0),
             x_scale="jac",
-            ftol=_FALL[self.has_rests][coarse],
-            xtol=1e-8 if coarse or self.has_rests else 1e-12,
+            ftol=falls[profile],
+            xtol=1e-8 if profile or self.has_rests else 1e-12,
             gtol=1e-12,
             max_nfev=200,
         )

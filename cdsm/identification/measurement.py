@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import final
 
@@ -12,7 +13,8 @@ from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import equilibrium
-from cdsm.statics.load_cycle import load_cycle
+from cdsm.statics.load_cycle import follow_loads
+from cdsm.statics.quasi_static import EquilibriumPath
 from cdsm.statics.weight_test import weight_test
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.validation import (
@@ -225,14 +227,25 @@ class WeightLoop:
 
     def predict(self, pose: Posture, tension: Tension | ArrayLike) -> Array:
         """Compute how far the forces would move the tip of a model of the arm, (m,) [m]."""
+        return self.follow(pose, tension)[0]
+
+    def follow(
+        self, pose: Posture, tension: Tension | ArrayLike, near: Sequence[EquilibriumPath] = ()
+    ) -> tuple[Array, tuple[EquilibriumPath, ...]]:
+        """Compute what ``predict`` does, and the path to each force, sought from paths ``near``.
+
+        Without friction there are no paths.
+        """
         F = tension.values if isinstance(tension, Tension) else tension
         W = np.array(self.wrench) + np.pad(self.applied, ((0, 0), (0, 3)))
+        paths: tuple[EquilibriumPath, ...] = ()
         if pose.arm.has_friction:
-            moved = load_cycle(pose, F, W, substeps=_SUBSTEPS).displacement
+            history, paths = follow_loads(pose, F, W, substeps=_SUBSTEPS, near=near)
+            moved = history.displacement
         else:  # the history has no influence, so each load is computed once
             loads, which = np.unique(W, axis=0, return_inverse=True)
             moved = np.array([equilibrium(pose, F, load).displacement for load in loads])[which]
-        return np.asarray(moved @ self.axes.T).ravel()
+        return np.asarray(moved @ self.axes.T).ravel(), paths
 
     def errors(self, predicted: Array) -> tuple[Array, float]:
         """Return errors less their mean along each axis (the unknown zero of least χ²), and σ."""

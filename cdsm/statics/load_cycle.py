@@ -15,7 +15,7 @@ from cdsm.friction.capstan import assemble_segments
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
-from cdsm.statics.quasi_static import Load, QuasiStaticArm
+from cdsm.statics.quasi_static import NO_PATH, EquilibriumPath, Load, QuasiStaticArm
 from cdsm.stiffness_matrix import FrictionState, Stiffness, checked_tension
 from cdsm.support.format import without_rounding
 from cdsm.support.progress import show_progress
@@ -210,6 +210,23 @@ def load_cycle(
             law.
         EquilibriumError: No equilibrium was found in the step to a load. The error names the load.
     """
+    return follow_loads(pose, tension, wrenches, motors=motors, substeps=substeps)[0]
+
+
+def follow_loads(
+    pose: Posture,
+    tension: Tension | Equilibrium | ArrayLike,
+    wrenches: ArrayLike,
+    *,
+    motors: ArrayLike | None = None,
+    substeps: int = 4,
+    near: Sequence[EquilibriumPath] = (),
+) -> tuple[LoadHistory, tuple[EquilibriumPath, ...]]:
+    """Compute what :func:`load_cycle` does, and the path to each load (n).
+
+    The searches begin at the paths ``near``, such as those of a similar arm: then they take fewer
+    steps.
+    """
     slack = np.zeros(len(instance("pose", pose, Posture).arm.cables))
     if isinstance(tension, Equilibrium):
         rest = tension.resumed(pose, None)
@@ -239,14 +256,15 @@ def load_cycle(
     pairs = tuple(zip(loads, commands, strict=True))
     for k, (wrench, command) in enumerate(show_progress(pairs, "loads")):
         goal = Load(wrench, none, command)
-        state, step = arm.step_to(state, goal, substeps, f"the step to load {k}")
+        known = near[k] if near else NO_PATH
+        state, step = arm.step_to(state, goal, substeps, f"the step to load {k}", known)
         states.append(state)
         steps.append(step)
     hole = pose.segments.chains.hole
     rough = pose.segments.chains.friction > 0.0
     arms = [state.arm_state for state in states]
     last = np.array([arm_state.chain.slip[hole] for arm_state in arms])
-    return LoadHistory(
+    history = LoadHistory(
         reference=pose,
         reference_tension=F,
         reference_wrench=W,
@@ -262,6 +280,7 @@ def load_cycle(
         dissipated=frozen(np.array([step.dissipated for step in steps])),
         snaps=frozen(np.array([step.snapped for step in steps])),
     )
+    return history, tuple(step.path for step in steps)
 
 
 def _commands(motors: ArrayLike, pose: Posture, shape: tuple[int, ...], wire: Array) -> Array:

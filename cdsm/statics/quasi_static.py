@@ -9,8 +9,9 @@ computes the tensions at any posture nearby. ∂r/∂q is not symmetric where ca
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,10 @@ from cdsm.statics.solve import ArmState, Balance, Point, continued, settle
 from cdsm.support.values import Array, frozen
 from cdsm.terms import stiffness_of, torque_of, torque_size_of, without_cables
 
+EquilibriumPath = Mapping[float, Array]
+"""Equilibria x (nv,) on the way to a load, as normal maps solve them, by the part of the way."""
+
+NO_PATH: Final[EquilibriumPath] = {}
 _SHORTEST = 2.0**-8  # shortest sub-step, as a part of the step between two loads
 
 
@@ -59,6 +64,7 @@ class Step(NamedTuple):
     slip: Array  # rest length that moved from each segment to the next (S,) [m]
     dissipated: float  # work lost to friction in the holes [J]
     snapped: bool  # whether the arm jumped
+    path: EquilibriumPath  # the equilibria at the ends of the sub-steps
 
 
 class QuasiStaticArm:
@@ -94,14 +100,20 @@ class QuasiStaticArm:
         return QuasiStaticState(Load(wrench, state.residual, motors), state, x, frozen(none))
 
     def step_to(
-        self, before: QuasiStaticState, load: Load, substeps: int, what: str
+        self,
+        before: QuasiStaticState,
+        load: Load,
+        substeps: int,
+        what: str,
+        near: EquilibriumPath = NO_PATH,
     ) -> tuple[QuasiStaticState, Step]:
         """Change the load of an equilibrium to ``load`` in equal sub-steps.
 
         A sub-step is halved where no stable equilibrium is found near the last one. If it cannot be
         halved further, the arm jumps to the next stable one. Raises EquilibriumError if there is
         none, and ElasticityRangeError if a tension of the new state is outside its law. The error
-        texts call the step ``what``.
+        texts call the step ``what``. The search for an equilibrium begins at that of the path
+        ``near``, such as of a similar arm, where it has one.
         """
         state = before
         motion = np.zeros_like(before.x)
@@ -109,13 +121,16 @@ class QuasiStaticArm:
         part = 1.0 / substeps
         dissipated = 0.0
         snapped = False
+        path = dict[float, Array]()
         slip = last = np.zeros_like(before.arm_state.chain.slip)
         while done < 1.0:
             goal = done + part if done + 1.5 * part < 1.0 else 1.0
             target = before.load.interpolate(load, goal)
             old = state.arm_state
             f = self._balance(state, target)
-            point: Point | None = continued(f, (state.x + motion, state.x), old.pose.q)
+            known = [near[goal]] if goal in near else []
+            guesses = [*known, state.x + motion, state.x]
+            point: Point | None = continued(f, guesses, old.pose.q)
             if point is None and goal - done > _SHORTEST:
                 part = (goal - done) / 2.0
                 motion = 0.0 * motion
@@ -132,12 +147,13 @@ class QuasiStaticArm:
             dissipated += float(np.where(again, (start + end) / 2.0, end) @ now)
             motion = point.x - state.x
             state = QuasiStaticState(target, new, point.x, point.stop_torque)
+            path[goal] = point.x
             slip = slip + now
             last = now
             done = goal
             part = min(2.0 * part, 1.0 / substeps)
         self._require_domains(state.arm_state.tension, what)
-        return state, Step(slip, dissipated, snapped)
+        return state, Step(slip, dissipated, snapped, path)
 
     def _balance(self, before: QuasiStaticState, load: Load) -> Balance:
         """Return the normal map of the states that follow ``before`` under a load."""

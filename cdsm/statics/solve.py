@@ -32,6 +32,7 @@ FAR = 0.1  # largest motion of a joint [rad] from one equilibrium to the next wh
 _LONGEST = 0.2  # longest step of a joint [rad]
 _DENSE = 0.02  # distance [rad] of the postures at which the way to an equilibrium is checked
 _STEPS = 300  # most steps of the search for an equilibrium
+_SHORTER = 4  # most times that a step which goes too far is shortened
 _KICK = 0.01  # step off a saddle [rad]
 _NOISE = 1e-13  # |r| that is rounding, over the sum of magnitudes
 _APART = 1e-6  # a joint stops this far [rad] before its disks touch: cables have no direction there
@@ -208,7 +209,10 @@ def _descend(
             shifted = here.slope + max(shift, -1.5 * lowest) * identity
             step = f.limited(here.x, -_solved(shifted, here.value))
             kicks *= bool(abs(step).max() < _KICK)
-        there = f.attempt(here.x + step)
+        if saddle:
+            there = f.attempt(here.x + step)
+        else:
+            there, step = _reached(f, here, step)
         gain = float(here.value @ step)
         if there and (saddle or 0.0 > 0.5 * gain > (here.value + there.value) @ step):
             here = there
@@ -216,6 +220,22 @@ def _descend(
         else:
             shift = 4.0 * max(shift, -lowest, 1e-4 * f.k)
     return here, False
+
+
+def _reached(f: Balance, here: Point, step: Array) -> tuple[Point | None, Array]:
+    """Return the point after a step, and the step: shortened where the arm would swing back.
+
+    Where cables begin to stick, K grows within the step, and f·step has turned positive at its end:
+    the next end is where f·step is 0 if it is linear along the step.
+    """
+    there = f.attempt(here.x + step)
+    for _ in range(_SHORTER):
+        start = float(here.value @ step)
+        if there is None or not 0.0 < -0.5 * start <= (end := float(there.value @ step)):
+            break
+        step = start / (start - end) * step
+        there = f.attempt(here.x + step)
+    return there, step
 
 
 def _polished(f: Balance, here: Point) -> Point:

@@ -81,12 +81,12 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     for seed in range(200):
         problem = LeastSquares(hinge, None, measured(seed, planned), FREE)
         truth = problem.point(np.array(list(TRUE.values())))
-        best = problem.search(truth, coarse=True)
+        best = problem.search(truth, profile=True)
         # an interval holds a value if Δχ² with the parameter fixed there is at most its level²
         for i in range(truth.size):
             fixed = best.copy()
             fixed[i] = truth[i]
-            fixed = problem.search(fixed, np.flatnonzero(np.arange(truth.size) != i), coarse=True)
+            fixed = problem.search(fixed, np.flatnonzero(np.arange(truth.size) != i), profile=True)
             held.append(problem.cost(fixed) - problem.cost(best) <= norm.ppf(0.975) ** 2)
     shares = np.reshape(held, (-1, 2)).mean(axis=0)
     assert ((shares >= 0.91) & (shares <= 0.98)).all(), shares
