@@ -21,7 +21,7 @@ from cdsm.rigid_body import RigidBody
 from cdsm.routing import SHORTEST_SEGMENT, Routing
 from cdsm.segments import Chains
 from cdsm.status import Status
-from cdsm.support.format import JointUnits, plural
+from cdsm.support.format import JointUnits, one_unit, plural
 from cdsm.support.validation import flag, vector
 from cdsm.support.values import Array, Printed, frozen
 from cdsm.tolerances import Tolerances
@@ -190,12 +190,18 @@ class ComputedArm(Printed):
         return self.body.joint_units
 
     def torque_unit(self, joint: int | None = None) -> str:
-        """Return the unit of torque of a joint or, if None, of all: "N m", "N" or "N m or N"."""
-        return JointUnits(self.slides).joined("N m", "N", joint)
+        """Return the unit of torque of a joint or, if None, of a number of all joints.
+
+        With joints of both kinds that is N m, and the text says how forces count.
+        """
+        return one_unit(JointUnits(self.slides).joined("N m", "N", joint))
 
     def stiffness_unit(self, joint: int | None = None) -> str:
-        """Return the unit of stiffness of a joint or, if None, of all: "N m/rad or N/m"."""
-        return JointUnits(self.slides).joined("N m/rad", "N/m", joint)
+        """Return the unit of stiffness of a joint or, if None, of a number of all joints.
+
+        With joints of both kinds that is N m/rad, and the text says how ways count.
+        """
+        return one_unit(JointUnits(self.slides).joined("N m/rad", "N/m", joint))
 
     def __repr__(self) -> str:
         return f"<Manipulator {self}>"

@@ -160,7 +160,8 @@ class InfeasibleTension(CdsmError):
         joint: str,
         relaxation: float,
         binding: Texts,
-        units: tuple[str, str] = ("N m", "N m"),
+        units: Texts = (),
+        names: Texts = (),
         fixed: Texts = (),
         hint: str = "",
     ) -> None:
@@ -181,8 +182,15 @@ class InfeasibleTension(CdsmError):
             at = ", ".join(binding) or "none"
             advice = f"Widening every bound by {wider:.4g} N would be enough (cables at a bound: "
             advice += f"{at}). Reduce the load{hint and f', or {hint}'}."
-        most = f"largest at {joint} ({abs(missing).max():.4g} {units[1]})"
-        message = f"torque deficit {abs(missing).sum():.4g} {units[0]}, {most}. {advice}"
+        if len({*units}) > 1:  # torques and forces have no sum
+            order = sorted(range(len(units)), key=lambda j: (names[j] != joint, -abs(missing[j])))
+            lacks = [j for j in order if abs(missing[j]) > 1e-9 * abs(missing).max()]
+            parts = [f"{abs(missing[j]):.4g} {units[j]} at {names[j]}" for j in lacks]
+            message = f"missing are {listed(parts)}. {advice}"
+        else:
+            unit = units[0] if units else "N m"
+            most = f"largest at {joint} ({abs(missing).max():.4g} {unit})"
+            message = f"torque deficit {abs(missing).sum():.4g} {unit}, {most}. {advice}"
         super().__init__(f"no tension within the bounds balances the arm: {message}")
 
 

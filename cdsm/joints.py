@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from lxml import etree
 
-from cdsm.errors import GeometryError, InvalidInput
+from cdsm.errors import GeometryError, InvalidInput, listed
 from cdsm.support.validation import one_of, scalar, within
 from cdsm.support.values import Array, frozen
 
@@ -84,16 +84,37 @@ def coupling_of(
     return Coupling(frozen(S), frozen(offset), tuple(names.index(name) for name in leaders))
 
 
-def limits_of(coupling: Coupling, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Return the limits of φ (nv,) that keep all joints within theirs (n,)."""
-    low = np.full(len(coupling.leaders), -np.inf)
-    high = np.full(len(coupling.leaders), np.inf)
+class CoupledLimits(NamedTuple):
+    """Limits of the nv independent joints that keep all n joints within theirs."""
+
+    lower: Array  # (nv,)
+    upper: Array  # (nv,)
+    narrowing: tuple[tuple[str, ...], ...]  # for each joint, the followers that narrow its limits
+
+
+def limits_of(
+    coupling: Coupling, names: tuple[str, ...], lower: Array, upper: Array
+) -> CoupledLimits:
+    """Return the limits of φ (nv,) that keep all joints ``names`` within theirs (n,).
+
+    Raises GeometryError if a joint and its followers have no angle in common.
+    """
+    low = lower[list(coupling.leaders)].copy()
+    high = upper[list(coupling.leaders)].copy()
+    narrowing: list[tuple[str, ...]] = [() for _ in coupling.leaders]
     for i, j in zip(*np.nonzero(coupling.matrix), strict=True):
         factor = coupling.matrix[i, j]
         ends = sorted((end - coupling.offset[i]) / factor for end in (lower[i], upper[i]))
+        if ends[0] > low[j] or ends[1] < high[j]:
+            narrowing[j] += (names[i],)
         low[j] = max(low[j], ends[0])
         high[j] = min(high[j], ends[1])
-    return frozen(low), frozen(high)
+    for j in np.flatnonzero(low > high).tolist():
+        leader = names[coupling.leaders[j]]
+        problem = f"{leader} has no possible angle: {listed(narrowing[j])}, which mimics it, keeps "
+        problem += f"its own limits only where {leader} is beyond its limits. Change a limit, or "
+        raise GeometryError(f"{problem}multiplier or offset of the <mimic>.")
+    return CoupledLimits(frozen(low), frozen(high), tuple(narrowing))
 
 
 Spring = float | Sequence[float]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,8 @@ from cdsm.support.format import beyond
 from cdsm.support.values import Array
 
 _STAY = "Stay inside, or widen joint_limit in the geometry (limit of a joint, or in a URDF)"
+
+_DEGREES = ", or, in Python, give radians: np.deg2rad(q), if these are degrees"
 
 UNCHECKED = ", or, in Python, pass check_limits=False to compute beyond them"
 """What the error of angles beyond their limits advises besides, where that can be done."""
@@ -27,10 +31,12 @@ def require_within_limits(body: RigidBody, q: Array) -> None:
     outside = beyond_limits(body, q)
     if not outside.any():
         return
-    texts = [
-        beyond(body.joint_names[i], *values, body.joint_units[i])
-        for i in np.flatnonzero(outside).tolist()
-        for values in [(float(q[i]), float(body.lower[i]), float(body.upper[i]))]
-    ]
-    message = f"{listed(texts, 4, '; ')}. {_STAY}{UNCHECKED}."
+    texts = []
+    for i in np.flatnonzero(outside).tolist():
+        values = float(q[i]), float(body.lower[i]), float(body.upper[i])
+        narrowed = f", narrowed by {listed(followers)}" if (followers := body.narrowing[i]) else ""
+        texts.append(beyond(body.joint_names[i], *values, body.joint_units[i]) + narrowed)
+    turned = q[outside & ~body.slides]
+    remedy = _DEGREES if abs(turned).max(initial=0.0) > math.pi else UNCHECKED
+    message = f"{listed(texts, 4, '; ')}. {_STAY}{remedy}."
     raise InvalidInput("q", message, Status.BEYOND_LIMITS)

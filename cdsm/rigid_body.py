@@ -92,8 +92,12 @@ class RigidBody:
         self.name: str = model.name
         self.lower: Array = frozen(_unlimited(model.lowerPositionLimit))
         self.upper: Array = frozen(_unlimited(model.upperPositionLimit))
+        self.narrowing: tuple[tuple[str, ...], ...] = ((),) * self.nv
         if self.coupling:
-            self.lower, self.upper = limits_of(self.coupling, self.lower, self.upper)
+            limits = limits_of(self.coupling, names, self.lower, self.upper)
+            self.lower = limits.lower
+            self.upper = limits.upper
+            self.narrowing = limits.narrowing
         self.lowest = frozen(self.lower - LIMIT_SLACK)
         self.highest = frozen(self.upper + LIMIT_SLACK)
         self._frames = {
@@ -117,6 +121,11 @@ class RigidBody:
     def joint_units(self) -> tuple[str, ...]:
         """Unit of each joint's coordinate (nv,): rad, or m for a prismatic joint."""
         return tuple("m" if slides else "rad" for slides in self.slides)
+
+    @property
+    def branches(self) -> bool:
+        """Whether two joints hang on one link, so that the order of joints is not plain."""
+        return len({*self.parent[1:]}) < len(self.parent) - 1
 
     def state(self, q: Array) -> State:
         """Compute everything at joint angles q (nv,)."""

@@ -151,6 +151,7 @@ def _joint_faults(joints: list[etree._Element]) -> Iterator[str]:
             yield f"{where}: its origin is further than {RANGES['length'].high:g} m away"
         if joint in moving and np.linalg.norm(_vector(joint.find("axis"), "1 0 0")) < 1e-6:
             yield f"{where}: its axis has no direction"
+        _doubt_rotation(where, joint.find("origin"))
         low, high = (_number(limit, key) for key in ("lower", "upper"))
         if kind == "continuous":
             continue
@@ -160,6 +161,16 @@ def _joint_faults(joints: list[etree._Element]) -> Iterator[str]:
         elif kind == "revolute" and max(abs(low), abs(high)) > 4.0 * math.pi:
             degrees = f"in radians they are {math.radians(low):.4g} to {math.radians(high):.4g}"
             warn(f"{where}: limits {low:g} to {high:g} rad are over two turns. Degrees? {degrees}.")
+
+
+def _doubt_rotation(where: str, origin: etree._Element | None) -> None:
+    """Warn of an rpy that is more than a turn, as if in degrees."""
+    text = "0" if origin is None else origin.get("rpy") or "0"
+    turns = [float(word) for word in text.split()]
+    if max(map(abs, turns)) > 2.0 * math.pi + _LOOSE:
+        radians = " ".join(f"{math.radians(turn):.4g}" for turn in turns)
+        degrees = " ".join(f"{turn:g}" for turn in turns)
+        warn(f"{where}: rpy {degrees} of its origin is over a turn. Degrees? {radians} rad.")
 
 
 def _ends(joint: etree._Element) -> tuple[str, str]:

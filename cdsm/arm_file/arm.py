@@ -58,10 +58,12 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
     - ``wire``: a name such as ``"1x19-1.2mm"``, a constant rigidity [N], or the NAME of a table
       ``[wires.NAME]`` in the form of :meth:`Elasticity.read`.
     - Optional: ``series_stiffness`` [N/m], ``control`` (``"position"`` or ``"force"``),
-      ``minimum`` and ``maximum`` [N], ``slack`` [m] and ``gain``. These keys and ``wire`` may also
-      stand at the top of the file, for all cables without their own.
+      ``minimum`` and ``maximum`` [N], ``slack`` [m] and ``gain``.
     - Optional: ``lead`` [m], the straight cable between the actuator and the first site, and
       ``friction``, the coefficient in all holes that the cable passes.
+
+    These keys, but not ``name`` and ``sites``, may also stand at the top of the file, for all
+    cables without their own.
 
     Args:
         path: The file.
@@ -122,7 +124,7 @@ def _routed(cable: Cable, settings: dict[str, Any]) -> dict[str, Any]:
 HELD: Final = 0.35
 """Joint limit of a first arm of universal joints [rad]: cables hold nearly all postures within."""
 
-_OTHERS: Final = ("geometry", "urdf", "cables", "wire", "original_length")
+_OTHERS: Final = ("geometry", "urdf", "cables", "wire", "original_length", "lead")
 _KEYS: Final = tuple(key for key in ArmFile.__annotations__ if key not in _OTHERS)
 """Keys of a file that are attributes of an arm; its robot and its cables are more than one key."""
 

@@ -94,6 +94,12 @@ def _alone(urdf: object, info: Info) -> object:
     return urdf
 
 
+def _of_routed(lead: float | None, info: Info) -> float | None:
+    if lead is not None and info.data.get("geometry") is not None:
+        raise ValueError("belongs to the joints of a geometry: [universal], [hinged] or [backbone]")
+    return lead
+
+
 def _described(tables: dict[str, Any]) -> Geometry:
     """Build the geometry; a key of the whole file that stands in one of its tables is told so."""
     if not tables:
@@ -178,14 +184,15 @@ class _Settings:
 @record
 class _Routed(_Settings):
     name: Label
-    lead: records.LengthOrZero = 0.0
+    lead: records.LengthOrZero | None = None
     sites: Annotated[tuple[PathEntry, ...], Field(strict=False, min_length=2)]
 
-    def built(self, friction: float) -> Cable:
+    def built(self, friction: float, common_lead: float) -> Cable:
         """Return the cable; ``friction`` is that of holes without one of their own."""
-        holes = range(0 if self.lead else 1, len(self.sites) - 1)
+        lead = common_lead if self.lead is None else self.lead
+        holes = range(0 if lead else 1, len(self.sites) - 1)
         path = (entry.built(friction * (i in holes)) for i, entry in enumerate(self.sites))
-        return Cable(self.name, tuple[Any, ...](path), _NO_WIRE, self.lead)
+        return Cable(self.name, tuple[Any, ...](path), _NO_WIRE, lead)
 
 
 @record
@@ -244,7 +251,7 @@ def _built(value: Any, check: Callable[[Any], Any], info: Info) -> Cables:
             slack = keys.pop("slack_below", False)
             law = law.slack_below() if law and slack else law or _NO_WIRE
             if isinstance(route, _Routed):
-                route = route.built(mu or 0.0)
+                route = route.built(mu or 0.0, known.get("lead") or 0.0)
             elif mu is not None:
                 route = route.with_friction(mu)
             cables.append(replace(route, elasticity=law, **keys))
@@ -281,6 +288,7 @@ class ArmFile(_Settings, _Wires):
             no torque ``[2.0, 0.1]``.
         tolerances: Table of standard deviations, with a key for each source.
         urdf: Table of a robot that no generator makes.
+        lead: Straight cable between actuator and first site [m], of all ``[[cables]]``.
         cables: Tables ``[[cables]]`` of a robot's cables; or ``[cables.NAME]`` of keys in which one
             cable differs.
     """
@@ -292,6 +300,7 @@ class ArmFile(_Settings, _Wires):
     springs: dict[str, records.PerJoint[records.Number]] | None = None
     geometry: Annotated[Any, PlainValidator(_described), Field(alias=_ROBOT)] = None
     urdf: Annotated[Urdf | None, AfterValidator(_alone)] = None
+    lead: Annotated[records.LengthOrZero | None, AfterValidator(_of_routed)] = None
     cables: Annotated[_Tables, WrapValidator(_built), Field(validate_default=True)] = None  # type: ignore[assignment]
 
 

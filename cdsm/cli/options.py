@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 import cdsm
-from cdsm.cli.output import misuse
+from cdsm.cli.output import misuse, note
 
 if TYPE_CHECKING:
     from cdsm.support.values import Array
@@ -125,6 +125,9 @@ def load_at_tip(arm: cdsm.Manipulator, load: str | None, mass: float | None = No
     return wrench
 
 
+_TINY = 0.2  # largest angle [deg] that looks as if it is in radians
+
+
 def joint_scales(arm: cdsm.Manipulator) -> Array:
     """Return the SI value (nv,) of the unit of each joint on the command line: 1° or 1 mm."""
     import numpy as np
@@ -149,6 +152,11 @@ def joint_coordinates(text: str | None, arm: cdsm.Manipulator) -> Array:
     else:
         form = f"one angle, one for each of {', '.join(names)}, or some by name: {names[-1]}=10"
         values = parse_numbers("--angles", "0" if text is None else text, (1, arm.nv), form)
+        if len(values) > 1 and arm.body.branches:
+            note(f"--angles are those of {', '.join(names)}, in this order: the robot branches")
+    turning = values if not arm.slides.any() else []
+    if 0.0 < max(map(abs, turning), default=0.0) < _TINY:
+        note(f"all --angles are below {_TINY:g}°: they are in degrees, not in radians")
     pairs = zip(names, values * arm.nv if len(values) == 1 else values, strict=True)
     return joint_scales(arm) * [scalar(f"--angles of {name}", value) for name, value in pairs]
 

@@ -42,6 +42,11 @@ def misuse(option: str, problem: str) -> typer.BadParameter:
     return typer.BadParameter(problem, param_hint=option)
 
 
+def note(text: str) -> None:
+    """Print a remark on standard error."""
+    typer.echo(f"note: {text}", err=True)
+
+
 def answer(as_json: bool, numbers: Json, *parts: object, warnings: Iterable[str] = ()) -> int:
     """Print an answer, its warnings first: ``parts`` as text, or ``numbers`` as strict JSON.
 

@@ -15,6 +15,7 @@ from cdsm.planning.range import StiffnessRange
 from cdsm.plots import style
 from cdsm.plots.style import N_PER_MM
 from cdsm.quantities import QUANTITIES, display_of, si_of
+from cdsm.support.format import one_unit
 from cdsm.support.status import check_sweep
 from cdsm.support.validation import instance, one_of
 from cdsm.support.values import Array
@@ -133,7 +134,7 @@ def plot_tension_curve(dataset: xarray.Dataset, quantity: str = "along") -> Figu
         axes.plot(held[order], column, ".-", color=style.COLORS[k % 7], label=f"{label}")
     axes.set_xlabel("least tension of every cable [N]")
     words = QUANTITIES[quantity].words.removesuffix(" along a direction")
-    axes.set_ylabel(f"{words} [{unit}]" if unit.strip("1") else words)
+    axes.set_ylabel(f"{words} [{one_unit(unit)}]" if unit.strip("1") else words)
     style.from_zero(axes, values)
     if rows.ndim == 2:
         axes.legend(title="along")

@@ -112,6 +112,17 @@ def key(name: str, unit: str) -> str:
     return "_".join([name, *(words[1:] if words[:1] == ["1"] else words)])
 
 
+_COUNTED: Final = {
+    "N m/rad or N/m": "N m/rad (1 m counted as 1 rad)",
+    "N m or N": "N m (1 N counted as 1 N m)",
+}
+
+
+def one_unit(unit: str) -> str:
+    """Return the unit of one number of joints that turn and slide, and how it was made one."""
+    return _COUNTED.get(unit, unit)
+
+
 class JointUnits(NamedTuple):
     """Units of the joints of an arm; joints are revolute or prismatic."""
 

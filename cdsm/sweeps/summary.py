@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from cdsm.quantities import QUANTITIES, display_of, si_of
-from cdsm.support.format import aligned, span
+from cdsm.support.format import aligned, one_unit, span
 from cdsm.support.status import status_names
 from cdsm.support.values import Array
 
@@ -28,7 +28,7 @@ def numbers_of(dataset: xarray.Dataset) -> dict[str, tuple[str, Array]]:
     for name in (name for name in dataset.data_vars if name in QUANTITIES):
         variable = dataset[name]
         unit, size = display_of(si_of(variable.units))
-        unit = "" if unit == "1" else unit
+        unit = one_unit(unit.strip("1"))
         if {*variable.dims} - {*entry} == {"direction"}:
             for label, column in variable.groupby("direction"):
                 numbers[f"{name} {label}"] = unit, _existing(column.values / size)
@@ -63,7 +63,7 @@ def curve_lines(dataset: xarray.Dataset) -> list[str]:
     for name in (name for name in dataset.data_vars if name in QUANTITIES):
         variable = dataset[name]
         unit, size = display_of(si_of(variable.units))
-        head = f"{name} [{unit}]" if unit.strip("1") else str(name)
+        head = f"{name} [{one_unit(unit)}]" if unit.strip("1") else str(name)
         if variable.dims == ("minimum", "direction"):
             for label, column in variable.groupby("direction"):
                 values = column.values.ravel() / size

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,8 @@ from cdsm.support.format import plural
 from cdsm.support.values import Array, frozen
 from cdsm.tension.least_tensions import nearest_tensions
 from cdsm.tension.solvers import OPTIMALITY, TensionProblem, minimise
+
+_NO_ARM: Final = 1e-9  # of the largest moment arm: below, a cable does not pull a joint
 
 
 def infeasible(
@@ -34,18 +37,44 @@ def infeasible(
     names = pose.arm.cables.names
     missing = (b - A @ F) * arm * force
     tight = free & (np.minimum(F - low, high - F) <= OPTIMALITY)
-    worst = int(abs(missing).argmax())
+    one_sided = _one_sided(problem) if math.isinf(widening) else []
+    lever = np.where(pose.arm.slides, pose.arm.length, 1.0)  # of a force, to compare it
+    worst = one_sided[0] if one_sided else int(abs(missing * lever).argmax())
     return InfeasibleTension(
         frozen(missing),
         pose.arm.joint_names[worst],
         widening,
         binding=[names[c] for c in np.flatnonzero(tight)],
         fixed=[names[c] for c in np.flatnonzero(~free)] if blocked else (),
-        units=(pose.arm.torque_unit(), pose.arm.torque_unit(worst)),
-        hint=too_few_cables(pose.arm)
+        units=[pose.arm.torque_unit(joint) for joint in range(pose.arm.nv)],
+        names=pose.arm.joint_names,
+        hint=_sides(pose.arm, problem, one_sided) + too_few_cables(pose.arm)
         if math.isinf(widening)
         else advice(pose.arm, force * F, force * low, force * high, free),
     )
+
+
+def _one_sided(problem: TensionProblem) -> list[int]:
+    """Return the joints that cables pull to one side at most, and not to the one that is needed."""
+    A, b, low, *_ = problem
+    size = _NO_ARM * abs(A).max(initial=0.0)
+    forward = (size < A).any(axis=1)
+    backward = (-size > A).any(axis=1)
+    helped = ((b > 0.0) & forward) | ((b < 0.0) & backward)
+    loaded = (b != 0.0) | ((abs(A) > size) & (low > 0.0)).any(axis=1)
+    return np.flatnonzero(~(forward & backward) & ~helped & loaded).tolist()
+
+
+def _sides(arm: Manipulator, problem: TensionProblem, joints: list[int]) -> str:
+    """Say of these joints that all cables pull them to one side, or that none does."""
+    size = _NO_ARM * abs(problem.A).max(initial=0.0)
+    free = [arm.joint_names[j] for j in joints if (abs(problem.A[j]) <= size).all()]
+    pulled = [arm.joint_names[j] for j in joints if arm.joint_names[j] not in free]
+    text = f"No cable pulls {listed(free)}: lead one past it. " if free else ""
+    if pulled:
+        text += f"All cables pull {listed(pulled)} to the same side: add one that pulls the other "
+        text += "way. "
+    return text
 
 
 def advice(
