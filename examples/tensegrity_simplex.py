@@ -104,7 +104,7 @@ def at_rest() -> Equilibrium:
 
 def active_share(rest: Equilibrium) -> float:
     """Compute the part of the stiffness of the lowest mode that is active (geometric)."""
-    K, shape = rest.stiffness, cdsm.modes(rest.pose, rest.stiffness).shapes[:, 0]
+    K, shape = rest.stiffness, cdsm.modes(rest.stiffness).shapes[:, 0]
     active = shape @ (K.active + K.gravity) @ shape
     return float(active / (shape @ K.joint @ shape))
 
@@ -132,7 +132,7 @@ def main() -> None:
     rest = at_rest()
     horizontal, diagonal, strut = rest.tension[0], rest.tension[6], rest.tension[9]
     print(f"strut {-strut:.0f} N, horizontal cable {horizontal:.0f} N, diagonal {diagonal:.0f} N")
-    first, second = cdsm.modes(rest.pose, rest.stiffness).frequencies[:2]
+    first, second = cdsm.modes(rest.stiffness).frequencies[:2]
     print(f"lowest mode {first:.3f} Hz (computed there: 2.166 Hz), the next {second:.1f} Hz")
     print(f"{100.0 * active_share(rest):.0f} % of the stiffness of the lowest mode is active")
 

@@ -28,7 +28,7 @@ RESULTS = (
     POSE,
     PULL,
     K,
-    cdsm.modes(POSE, K),
+    cdsm.modes(K),
     cdsm.equilibrium(POSE, PULL, random_wrench(3)),
     cdsm.stiffness_range(POSE, (0.0, 0.3, 1.0), 10.0, 200.0),
     cdsm.uncertainty(POSE, PULL, cdsm.Tolerances(rigidity=0.05), direction="z"),

@@ -12,7 +12,7 @@ from typing import final
 
 import numpy as np
 
-from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.errors import SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import aligned
@@ -74,8 +74,8 @@ class Modes(Result, Plotted):
         return "\n".join(lines)
 
 
-def modes(pose: Posture, stiffness: Stiffness) -> Modes:
-    """Compute natural frequencies and mode shapes at a posture: K_θ φ = ω² M φ.
+def modes(stiffness: Stiffness) -> Modes:
+    """Compute natural frequencies and mode shapes at the posture of a stiffness: K_θ φ = ω² M φ.
 
     The symmetric part of K_θ is used. A skew part, which a moment at the tip or sliding cables add,
     is left out. The modes describe a small vibration about the posture, without losses by friction
@@ -84,17 +84,15 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
     false; this is not an error.
 
     Args:
-        pose: The posture.
-        stiffness: K_θ, the result of :func:`~cdsm.stiffness` at this posture.
+        stiffness: K_θ, the result of :func:`~cdsm.stiffness`; it has its posture.
 
     Raises:
-        InvalidInput: ``stiffness`` belongs to another posture or arm.
+        InvalidInput: ``stiffness`` is no Stiffness.
         SingularStiffness: A joint moves no mass, or hardly more than the placeholders of crosses
             and massless links.
     """
-    arm = instance("pose", pose, Posture).arm
-    if not instance("stiffness", stiffness, Stiffness).posture.equals(pose):
-        raise InvalidInput("stiffness", "belongs to another posture or arm; compute it for this.")
+    pose = instance("stiffness", stiffness, Stiffness).posture
+    arm = pose.arm
     M = arm.body.mass_matrix(pose.q)
     if arm.is_serpentine:
         _require_mass(pose, M)

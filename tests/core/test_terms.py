@@ -191,7 +191,7 @@ ABLE: dict[str, Callable[[], object]] = {
     "equilibrium": lambda: cdsm.equilibrium(POSE, PULL),
     "load cycle": lambda: cdsm.load_cycle(POSE, PULL, np.zeros((1, 6))),
     "weight test": lambda: cdsm.weight_test(POSE, PULL, [0.0, 0.0, -1.0]),
-    "modes": lambda: cdsm.modes(POSE, cdsm.stiffness(POSE, PULL)),
+    "modes": lambda: cdsm.modes(cdsm.stiffness(POSE, PULL)),
     "payload": lambda: cdsm.payload(POSE, "z", 1.0, 200.0),
     "force polytope": lambda: cdsm.force_polytope(POSE, 1.0, 200.0),
     "isotropy": lambda: cdsm.isotropy(cdsm.stiffness(POSE, PULL)),

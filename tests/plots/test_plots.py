@@ -85,7 +85,7 @@ PICTURES: tuple[Callable[[], Any], ...] = (
     lambda: PULL,
     lambda: K,
     lambda: K.shares("z"),
-    lambda: cdsm.modes(POSE, K),
+    lambda: cdsm.modes(K),
     lambda: REACH,
     lambda: cdsm.plan_stiffness(POSE, "z", TARGET, 10.0, 200.0),
     path,
