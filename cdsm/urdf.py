@@ -2,8 +2,9 @@
 
 The links are ``base_link`` (empty), ``base_disk`` (fixed to it), ``cross{k}`` (universal joints
 only), ``link{k}`` and ``tool0`` (at the end of the last link). The joints are ``joint{k}_1`` and
-``joint{k}_2``, or ``joint{k}`` for a hinge. Universal joints follow Table I of the paper,
-transformed by T(R_0→R_g) of Eq. 2.
+``joint{k}_2``, or ``joint{k}`` for a hinge. Surfaces that roll have ``roller{k}`` between the
+hinges ``joint{k}`` and ``joint{k}_roll``. Universal joints follow Table I of the paper, transformed
+by T(R_0→R_g) of Eq. 2.
 """
 
 from __future__ import annotations
@@ -163,11 +164,11 @@ def _body(geometry: Geometry, body: Body) -> etree._Element:
     parts = [_cylinder("disk", disk.x, disk.radius, thickness) for disk in disks]
     if length > 0.0:
         slim = backbone_radius(geometry, body)
-        parts.insert(0, _cylinder("backbone", length / 2, slim, length))
+        parts.insert(0, _cylinder("backbone", body.middle, slim, length))
     if body.name == "base_disk":
         return E.link(*parts, name=body.name)
     moments = [max(moment, inertia) for moment in _moments(geometry, body)]
-    parts.insert(0, inertial(body.mass or mass, np.diag(moments), *_at(length / 2)))
+    parts.insert(0, inertial(body.mass or mass, np.diag(moments), *_at(body.middle)))
     return E.link(*parts, name=body.name)
 
 
@@ -186,7 +187,7 @@ def _revolute(hinge: Axis) -> etree._Element:
     ends = E.limit(effort=1000.0, velocity=10.0, lower=-hinge.limit, upper=hinge.limit)
     parts = [*_at(hinge.x), E.axis(xyz=axis), ends]
     if hinge.leader:
-        parts.append(E.mimic(joint=hinge.leader, multiplier=1.0, offset=0.0))
+        parts.append(E.mimic(joint=hinge.leader, multiplier=hinge.multiplier, offset=0.0))
     return joint("revolute", hinge.name, hinge.parent, hinge.child, *parts)
 
 

@@ -12,6 +12,11 @@ from cdsm.cable import SETTINGS
 from cdsm.geometry.beams import Section
 from cdsm.support.described import attributes_of
 
+_ROLLING = {
+    "radius": "Radius [m] of the round end before each joint; other keys as in `[hinged]`.",
+    "second_radius": "Radius [m] of the round end that rolls on it; the same if it is left out.",
+}
+
 
 def table() -> str:
     """Return the table as Markdown: where a key stands, the key, and what it means."""
@@ -33,6 +38,7 @@ def table() -> str:
         *_rows("`[urdf]`", attributes_of(Urdf)),
         *_rows("`[universal]`, `[hinged]`", attributes_of(cdsm.Geometry.universal)),
         *_rows("`[hinged]`", {"twist": "Angle about x from each hinge axis to the next [rad]."}),
+        *_rows("`[rolling]`", {key: _ROLLING[key] for key in ("radius", "second_radius")}),
         *_rows("`[backbone]`", attributes_of(cdsm.Geometry.backbone)),
         *_rows("`[[backbone.sections]]`", attributes_of(Section)),
         *_rows("`[[sections]]`", {"spread": attributes_of(cdsm.Geometry.sections)["spread"]}),

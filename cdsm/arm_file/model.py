@@ -69,9 +69,12 @@ _GIVEN: Final = *SETTINGS, "friction", "slack_below"  # keys of all cables or of
 
 _ROBOT: Final = ONE  # key of the geometry, of which files have only the parts; no fault prints it
 _NO_ROBOT: Final = (
-    "describes no robot; give [universal], [hinged], [backbone], [[sections]] or [urdf]"
+    "describes no robot; give [universal], [hinged], [backbone], [rolling], [[sections]] or [urdf]"
 )
-_FORMS: Final = "universal", "hinged", "backbone", "sections", "geometry", "joints", "links"
+_FORMS: Final = (
+    *("universal", "hinged", "backbone", "rolling"),
+    *("sections", "geometry", "joints", "links"),
+)
 _NO_WIRE: Final = LinearElasticity(1e5)  # of cables whose wire is missing
 
 

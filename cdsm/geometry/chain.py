@@ -36,6 +36,12 @@ class Body(NamedTuple):
     mass: float  # [kg]
     joint: int  # number of the joint before it; 0: the base
     kind: str  # "link", "cross", or "beam"
+    start: float = 0.0  # where it begins [m]: behind the centre of a surface that rolls
+
+    @property
+    def middle(self) -> float:
+        """Middle of the body [m], in its frame."""
+        return self.start + self.length / 2.0
 
 
 class Axis(NamedTuple):
@@ -51,6 +57,7 @@ class Axis(NamedTuple):
     stiffness: float  # k of its spring [N m/rad]; 0: none
     rest_angle: float  # q_0 [rad]
     leader: str = ""  # joint whose angle it copies
+    multiplier: float = 1.0  # of the angle that it copies
 
 
 @dataclass
@@ -62,6 +69,7 @@ class Chain:
     at: int = 0  # number of the joint that is being added
     kind: str = "link"
     x: float = 0.0
+    begin: float = 0.0  # where the last body begins [m]
     mass: float = 0.0
     bodies: list[Body] = field(default_factory=list)
     axes: list[Axis] = field(default_factory=list)
@@ -69,15 +77,30 @@ class Chain:
 
     def end(self) -> None:
         """End the last body."""
-        self.bodies.append(Body(self.link, self.x, self.mass, self.behind, self.kind))
+        length = self.x - self.begin
+        body = Body(self.link, length, self.mass, self.behind, self.kind, self.begin)
+        self.bodies.append(body)
 
-    def turn(self, name: str, axis: tuple[float, ...], child: str, kind: str, *more: Any) -> None:
-        """End the last body at a joint, and begin the next; ``more`` as the last of an Axis."""
-        self.axes.append(Axis(name, self.link, child, self.x, axis, *more))
+    def turn(
+        self,
+        name: str,
+        axis: tuple[float, ...],
+        child: str,
+        kind: str,
+        *more: Any,
+        back: float = 0.0,
+        ahead: float = 0.0,
+    ) -> None:
+        """End the last body at a joint, and begin the next; ``more`` as the last of an Axis.
+
+        The axis is ``back`` [m] before the end, and ``ahead`` behind the beginning of the next.
+        """
+        self.axes.append(Axis(name, self.link, child, self.x - back, axis, *more))
         self.end()
         self.link = child
         self.kind = kind
-        self.x = 0.0
+        self.x = -ahead
+        self.begin = -ahead
         self.mass = 0.0
         self.behind = self.at
 
@@ -202,6 +225,18 @@ def _start(
     child = f"link{k}_start" if bends else f"link{k}"
     ends = limit, stops, joint.stiffness, joint.rest_angle
     leader = f"joint{joint.follows}" if joint.follows else ""
+    if joint.rolls:
+        # hinges at the centres of both surfaces, coupled so that they roll without slip
+        (r1, r2) = joint.rolls
+        axis = joint.axes[0]
+        chain.turn(name, axis, f"roller{k}", "cross", *ends, leader, back=r1)
+        chain.x = r1 + r2
+        follower = STEEPEST if limit == STEEPEST else limit * r1 / r2, stops, 0.0, 0.0
+        copies = name, r1 / r2
+        chain.turn(f"{name}_roll", axis, child, "link", *follower, *copies, ahead=r2)
+        chain.x = h - r2
+        chain.disk(k, radius, outer)
+        return r2
     if len(joint.axes) == 2:
         first = f"{leader}_1" if leader else ""
         chain.turn(f"{name}_1", joint.axes[0], f"cross{k}", "cross", *ends, first)

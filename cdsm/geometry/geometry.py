@@ -20,7 +20,7 @@ from cdsm.errors import GeometryError, listed, warn
 from cdsm.geometry.beams import Backbone
 from cdsm.geometry.chain import Chain, chain_of
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
-from cdsm.geometry.uniform import Hinged, Universal, same_angle, spread_out
+from cdsm.geometry.uniform import Hinged, Rolling, Universal, same_angle, spread_out
 from cdsm.support import records, validation
 from cdsm.support.files import read_text, write_text
 from cdsm.support.format import plural
@@ -48,7 +48,8 @@ class Geometry(Printed):
     """A serpentine arm, joint by joint; frozen, checked, all in SI units.
 
     :meth:`universal` and :meth:`hinged` build arms of similar joints, :meth:`backbone` one on a
-    flexible rod or tube; :meth:`sections` joins arms. Joint 1 is at x = ``base_length``, joint k+1
+    flexible rod or tube, :meth:`rolling` one whose links roll on each other; :meth:`sections` joins
+    arms. Joint 1 is at x = ``base_length``, joint k+1
     at the end of link k, and the tip at the end of the last link. Every joint has two disks, at the
     distance ``disk_offset`` before and after it; both have the ``hole_radius`` of the joint.
 
@@ -79,6 +80,7 @@ class Geometry(Printed):
     universal = staticmethod(_from_sizes(Universal))
     hinged = staticmethod(_from_sizes(Hinged))
     backbone = staticmethod(_from_sizes(Backbone))
+    rolling = staticmethod(_from_sizes(Rolling))
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -119,6 +121,9 @@ class Geometry(Printed):
             if cable.joint > n:
                 problem = f"{cable.joint} is past the last joint, {n}; give 1 to {n}"
                 yield f"cables[{c}].joint: {problem}"
+        for k, (joint, link) in enumerate(zip(joints, links, strict=False), start=1):
+            if joint.rolls and link.bending_stiffness is not None:
+                yield f"links[{k}].bending_stiffness: a link that rolls on another cannot bend"
         for k, joint in enumerate(joints, start=1):
             leader = joints[joint.follows - 1] if joint.follows and joint.follows < k else None
             if joint.follows and (leader is None or leader.follows or not joint.axes):

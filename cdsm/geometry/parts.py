@@ -46,6 +46,11 @@ class Joint:
         pieces: Number of equal pieces of which the neck is made; each has four or five joints.
         mass: Mass of the neck [kg].
         follows: Number of a joint before it, from 1, whose angles it copies; None: it is free.
+        rolls: Radii [m] of two round surfaces, before and after the joint, that roll on each other
+            without slip about its one axis; None: the joint is a pin. The angle of the joint is
+            then that of the line of centres: the links turn by 1 + r₁/r₂ times as much, and
+            limits, springs and stiffnesses count for this angle. The ``disk_offset`` counts from
+            the contact.
     """
 
     axes: Annotated[tuple[records.Vector, ...], Field(strict=False, max_length=2)] = ()
@@ -60,6 +65,7 @@ class Joint:
     pieces: Pieces = 1
     mass: records.Mass = 0.0
     follows: Annotated[records.Integer, Field(ge=1)] | None = None
+    rolls: Annotated[tuple[records.Length, records.Length], Field(strict=False)] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -69,14 +75,36 @@ class Joint:
         if 0.0 in lengths:
             fault = f"axes[{lengths.index(0.0) + 1}]: has no length; give a direction"
             raise records.CrossFaults([fault])
+        if self.rolls and len(self.axes) != 1:
+            fault = f"axes: {len(self.axes)} given for surfaces that roll; they need one"
+            raise records.CrossFaults([fault])
         units = np.array(self.axes) / np.array(lengths)[:, None]
         if len(units) == 2 and np.linalg.norm(np.cross(*units)) < 1e-6:
             raise records.CrossFaults([f"axes: {self.axes} are parallel; one would do"])
         return self
 
+    def _touching(self, surface: float, radius: float) -> float:
+        """Return the turn [rad] of a rolling surface at which its disk reaches the tangent plane.
+
+        The edge of the disk, at (r − h, R) from the centre, is then r ahead:
+        (r − h) cos θ + R sin θ = r.
+        """
+        ahead = surface - self.disk_offset
+        far = math.hypot(ahead, radius)
+        if far <= surface:
+            return math.pi
+        return math.atan2(radius, ahead) - math.acos(surface / far)
+
     def limit_of_disks(self, hole_radius: float) -> float:
         """Return the limit [rad] where disks touch, if the joint has no limit of its own."""
-        bend = min(2.0 * math.atan(self.disk_offset / (self.disk_radius or hole_radius)), STEEPEST)
+        radius = self.disk_radius or hole_radius
+        if self.rolls:
+            first, second = self.rolls
+            # the disk after the joint turns by r₁/r₂ times as much as the line of centres
+            share = first / second
+            touching = self._touching(first, radius), self._touching(second, radius) / share
+            return min(*touching, STEEPEST / (1.0 + share))
+        bend = min(2.0 * math.atan(self.disk_offset / radius), STEEPEST)
         if len(self.axes) < 2:
             return bend
         # two axes at right angles, both turned by x, bend the arm by γ: cos γ = cos² x

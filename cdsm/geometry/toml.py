@@ -13,7 +13,7 @@ from cdsm.geometry.geometry import Geometry
 from cdsm.geometry.uniform import Turn
 from cdsm.support.records import Name, parse, record
 
-_FORMS: Final = ("sections", "universal", "hinged", "backbone", "geometry")
+_FORMS: Final = ("sections", "universal", "hinged", "backbone", "rolling", "geometry")
 """Tables that describe a geometry; a file may have the keys of [geometry] at its top instead."""
 
 _OF_CABLES: Final = ("friction",)  # keys of a form that an arm has at its top, for its cables
@@ -45,7 +45,7 @@ def build(data: Mapping[str, Any]) -> Geometry:
     kind = next((key for key in _FORMS if key in data), "")
     if not kind and not data.keys() & {"joints", "links"}:
         keys = ", ".join(data) or "nothing"
-        known = "[universal], [hinged], [backbone], [[sections]] or joints"
+        known = "[universal], [hinged], [backbone], [rolling], [[sections]] or joints"
         raise GeometryError([f"holds {keys}; give {known}"])
     if kind == "sections":
         return Geometry.sections(**vars(parse(_Sections, data)))

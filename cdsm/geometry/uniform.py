@@ -168,6 +168,42 @@ class Hinged(Universal):
         return axes, hinge_hole_angles(rolls, self.cables_per_joint or 2)
 
 
+@records.record
+class Rolling(Hinged):
+    """Build an arm of n links whose round ends roll on each other, without slip.
+
+    The surfaces of joint k have the radii r₁ = ``radius``, on the link before it, and r₂ =
+    ``second_radius``. Equal arcs turn the line of their centres by q on the first, and by q r₁/r₂
+    on the second: a hinge ``joint{k}`` at the centre of the first surface, a link of length
+    r₁ + r₂, and a hinge ``joint{k}_roll`` at the centre of the second, which copies the first one
+    with the multiplier r₁/r₂. **The angle q is that of the line of centres; the links turn by
+    θ = q (1 + r₁/r₂) to each other**, 2 q for equal radii. Limits and springs count for q, and so
+    does K_θ: the stiffness for θ is K_θ/(1 + r₁/r₂)².
+
+    At q = 0 the contact of joint 1 is at x = ``base_length``, and each ``link_length`` goes from
+    contact to contact. ``disk_offset`` h counts from the contact. A hole on the rim of the surface,
+    at the angle α from the line of centres, has h = r (1 − cos α) and ``hole_radius`` r sin α. The
+    sum of the lengths of an antagonistic pair then grows as the joint bends (variable neutral
+    line), so tension straightens the arm.
+
+    Slip, and contacts that open, are not modelled. Hinge k turns about cos ψ_k y + sin ψ_k z, with
+    ψ_k = (k−1)·twist; ``twist`` is 90° by default. All other arguments are those of
+    :meth:`Geometry.hinged`.
+    """
+
+    radius: PerJoint[records.Length]
+    second_radius: PerJoint[records.Length] | None = None
+    twist: Turn = math.pi / 2.0
+
+    def parts(self) -> dict[str, Any]:
+        """Return the fields of the :class:`~cdsm.Geometry` by name."""
+        parts = super().parts()
+        radii = [self.radius, self.radius if self.second_radius is None else self.second_radius]
+        columns = [r if isinstance(r, Sequence) else [r] * self.joints for r in radii]
+        rows = zip(parts["joints"], *columns, strict=True)
+        return parts | {"joints": [replace(joint, rolls=(r1, r2)) for joint, r1, r2 in rows]}
+
+
 def evenly_spaced(joints: int, cables: int) -> list[list[float]]:
     """Return φ = 2π((k−1) + n j)/(n m) [rad] of cables j = 0…m−1 of each of n ``joints`` k."""
     n = joints

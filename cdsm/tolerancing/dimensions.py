@@ -127,7 +127,7 @@ def _numbers(
     at |= {"mass": bodies, "softness": springs}
 
     def read(chain: Chain) -> Array:
-        middles = [body.length / 2.0 for body in chain.bodies]
+        middles = [body.middle for body in chain.bodies]
         holes = [chain.disks[d].x for d in of_sites]
         masses = [body.mass for body in chain.bodies]
         soft = [1.0 / chain.axes[j].stiffness for j in springs]
