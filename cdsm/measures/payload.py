@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, final
+from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.errors import InfeasibleTension
+from cdsm.measures.holding import Holding, holding_following, holding_locked
 from cdsm.measures.polytope import Farthest, balanced, force_polytope
 from cdsm.posture import Posture
 from cdsm.status import Status
-from cdsm.stiffness_matrix import stiffness
+from cdsm.stiffness_matrix import checked_tension, stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import (
@@ -24,26 +26,35 @@ from cdsm.support.validation import (
     wrench_vector,
 )
 from cdsm.support.values import Array, frozen
-from cdsm.tension import bounds_at, distribute_tension
+from cdsm.tension import Tension, bounds_at, distribute_tension
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Payload(Result):
-    """Largest admissible force at the tip, by two limits; made by :func:`payload`.
+    """Largest admissible force at the tip; made by :func:`payload`.
 
-    The motors do different things at each limit. While the load comes they are locked, and the tip
-    yields: ``limits["deflection"]``. Afterwards they re-distribute the tensions, so that the arm is
-    in balance at its posture again: ``limits["tension"]``. An arm whose motors do both in turn
-    carries ``force``; one whose motors stay locked is not limited by ``limits["tension"]``.
+    The motors decide it. While they *follow*, they re-distribute the tensions, and the arm keeps
+    its posture: :attr:`following`. While they are *locked*, they hold the wire, and the arm yields:
+    :attr:`locked`. The two can differ by a factor of three.
+
+    ``limits`` are those of an arm whose motors are locked while the load comes, and then follow:
+    ``"deflection"`` while it yields, ``"tension"`` after that. ``force`` is the smaller one.
 
     Attributes:
         posture: The posture.
         direction: Unit direction (3,) of the force, base axes.
         worst: Whether ``direction`` is the worst of all directions.
         limits: Largest force [N] that each limit alone allows: ``"tension"`` (the bounds of the
-            tensions) and ``"deflection"`` (0 if the arm is unstable without the force); inf for a
-            limit that does not restrict it.
+            tensions) and ``"deflection"`` (to first order; 0 if the arm is unstable without the
+            force); inf for a limit that does not restrict it. 0 if no tensions balance the arm
+            without the force.
+        wrench: W (6,) that always acts: force [N], then moment [N m].
+        minimum: Lower bounds of the tensions that hold (C,) [N].
+        maximum: Upper bounds of the tensions that hold (C,) [N]; inf for none.
+        tension: Tensions (C,) [N] without the force at which the motors are locked; None if there
+            are none.
+        problem: Why no tensions balance the arm without the force; empty if some do.
     """
 
     _headline = "force"
@@ -52,6 +63,40 @@ class Payload(Result):
     direction: Array = field(metadata=unit("1", "axis"))
     worst: bool = field(metadata=unit("1"))
     limits: dict[str, float] = field(metadata=unit("N"))
+    wrench: Array
+    minimum: Array
+    maximum: Array
+    tension: Array | None
+    problem: str = ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The sentence why no tensions balance the arm without the force, if none do."""
+        return (self.problem,) if self.problem else ()
+
+    @quantity("1")
+    def following(self) -> Holding | None:
+        """What it holds while motors re-distribute the tensions; computed when first asked for.
+
+        Limits are the bounds of the tensions, the ends of the laws and the stability of the arm
+        under the least tensions, as in :func:`~cdsm.critical_load`. None if no tensions balance the
+        arm without the force.
+        """
+        bounds = self.minimum, self.maximum
+        return holding_following(self.posture, self.direction, self.wrench, *bounds)
+
+    @quantity("1")
+    def locked(self) -> Holding | None:
+        """What it holds with locked motors; computed when first asked for.
+
+        The force grows slowly, without friction. The first of these ends it: a tension passes its
+        maximum or leaves its law, a joint reaches its stop, the arm buckles. Cables that go slack
+        before are among the events. None if no tensions balance the arm without the force.
+        """
+        if self.tension is None:
+            return None
+        at = self.posture, self.direction, self.wrench
+        return holding_locked(*at, self.tension, self.maximum)
 
     @quantity("N")
     def force(self) -> float:
@@ -67,13 +112,13 @@ class Payload(Result):
 
     def __str__(self) -> str:
         along = coordinates(np.round(self.direction, 3) + 0.0, ".3g")
-        which = "the worst direction" if self.worst else "the direction"
-        by_tension, by_deflection = (f"{self.limits[name]:.4g} N" for name in self.limits)
-        return (
-            f"{self.force:.4g} N in {which} {along}, limit: {self.limit}\n"
-            f"tensions that the motors re-distribute allow {by_tension}, "
-            f"the deflection with locked motors {by_deflection}"
-        )
+        which = "worst direction" if self.worst else "direction"
+        cases = [str(case) for case in (self.following, self.locked) if case is not None]
+        lines = [*self.warnings, f"{which} {along}", *cases]
+        if math.isfinite(self.limits["deflection"]) and not self.problem:
+            allowed = f"{self.limits['deflection']:.4g} N"
+            lines.append(f"deflection allows {allowed} with locked motors, to first order")
+        return "\n".join(lines)
 
 
 def payload(
@@ -85,16 +130,18 @@ def payload(
     *,
     deflection: float = math.inf,
     worst_friction: bool = False,
+    tension: Tension | ArrayLike | None = None,
 ) -> Payload:
     """Compute the largest admissible force f along u at the tip, added to the wrench W.
 
-    Two limits are reported apart. Tension: the motors re-distribute the tensions,
+    :attr:`Payload.following` and :attr:`Payload.locked` say how much it holds, and what ends it,
+    with motors that follow and with locked ones; in kg too where u is the direction of gravity.
+    Two limits are numbers of their own. Tension: the motors re-distribute the tensions,
 
         max f  subject to  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum.
 
     Deflection: the motors are locked at the least tensions without the force, and f |C_vv u| is at
-    most ``deflection``, with their compliance C_vv. :func:`critical_load` gives the force at which
-    the arm buckles.
+    most ``deflection``, with their compliance C_vv.
 
     The worst direction has the smallest f. It is the normal of the nearest facet of the
     :func:`force_polytope`, or the softest direction of C_vv.
@@ -108,11 +155,14 @@ def payload(
         wrench: W (6,) at ``tool0`` in base axes that always acts: force [N], then moment [N m].
         deflection: Largest allowed displacement of the tip [m]; inf for no limit.
         worst_friction: Narrow the bounds for friction, as :func:`~cdsm.distribute_tension` does.
+        tension: F (C,) [N] at which the motors of :attr:`Payload.locked` are locked. Tensions that
+            do not balance the arm move it first. Default: the least ones without the force.
 
     Raises:
         InvalidInput: An argument has the wrong shape or range; or a cable has no upper bound, but
             the worst direction is wanted.
-        InfeasibleTension: No tensions balance the arm without the force.
+        InfeasibleTension: The worst direction is wanted, and no tensions balance the arm without
+            the force. With a direction, the limits are 0 and :attr:`Payload.problem` says why.
         ElasticityRangeError: A tension without the force is outside the domain of its law.
         SingularStiffness: K_θ without the force is singular.
         CdsmError: A linear program fails.
@@ -120,28 +170,38 @@ def payload(
     instance("pose", pose, Posture)
     allowed = checked_quantity("deflection", deflection, "length", infinite=True)
     W = wrench_vector("wrench", wrench)
-    K = stiffness(
-        pose, distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
-    )
-    C = K.compliance[:3, :3] if K.is_stable else np.zeros((3, 3))
     bounds = bounds_at(pose, minimum, maximum, worst_friction)
     low = bounds.minimum_held
     high = bounds.maximum_held
+    locked = None if tension is None else checked_tension(pose, tension, None)[0]
+    case: Any = {"posture": pose, "wrench": W, "minimum": low, "maximum": high}
+    try:
+        least = distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
+    except InfeasibleTension as error:
+        if direction is None:
+            raise
+        u = frozen(unit_direction("direction", direction))
+        none = {"tension": 0.0, "deflection": 0.0}
+        why: Any = {"tension": locked, "problem": f"without the force, {error}"}
+        return Payload(direction=u, worst=False, limits=none, **case, **why)
+    case["tension"] = least.values if locked is None else locked
+    K = stiffness(pose, least)
+    C = K.compliance[:3, :3] if K.is_stable else np.zeros((3, 3))
 
     def limits(u: Array) -> dict[str, float]:
         yields = float(np.linalg.norm(C @ u))
-        locked = allowed / yields if yields > 0.0 else math.inf
-        tension = largest_force(balanced(pose, u[:, None], W, low, high))
-        return {"tension": tension, "deflection": locked if K.is_stable else 0.0}
+        by_deflection = allowed / yields if yields > 0.0 else math.inf
+        by_tension = largest_force(balanced(pose, u[:, None], W, low, high))
+        return {"tension": by_tension, "deflection": by_deflection if K.is_stable else 0.0}
 
     if direction is not None:
         u = unit_direction("direction", direction)
-        return Payload(posture=pose, direction=frozen(u), worst=False, limits=limits(u))
+        return Payload(direction=frozen(u), worst=False, limits=limits(u), **case)
     polytope = force_polytope(pose, minimum, maximum, W, worst_friction=worst_friction)
     softest = np.linalg.svd(C)[2][0]
-    tried = [(u, limits(u)) for u in (polytope.worst_direction, softest, -softest)]
-    u, least = min(tried, key=lambda trial: sorted(trial[1].values()))
-    return Payload(posture=pose, direction=frozen(u), worst=True, limits=least)
+    candidates = [(u, limits(u)) for u in (polytope.worst_direction, softest, -softest)]
+    u, smallest = min(candidates, key=lambda candidate: sorted(candidate[1].values()))
+    return Payload(direction=frozen(u), worst=True, limits=smallest, **case)
 
 
 def largest_force(farthest: Farthest) -> float:

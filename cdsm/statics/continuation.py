@@ -21,6 +21,7 @@ from cdsm.support.values import Array
 
 _FINEST = 2.0**-12  # relative precision of the last share of the search; below 1e-9, absolute
 _RATE = 1e-6  # change of the share for a difference
+_STILL = 1e-9  # an arm that moves by less [rad] while the whole load comes does not move
 _NEWTON = 30  # most steps of Newton's method along the arc
 _CONVERGED = 1e-12  # largest |f| along the arc, over its scale
 
@@ -140,12 +141,15 @@ def _end_of_piece(model: Model, last: Stage, taut: Flags) -> tuple[Stage, int | 
 
     speed = rate(kept, last)
     length = float(np.linalg.norm(speed))
-    if length == 0.0:
-        raise _LOST
-    tangent = speed / length
+    still = length <= _STILL  # as a straight arm does under a load along it
+    tangent = speed / (length or 1.0)
     stages = {0.0: last}
 
     def at(distance: float) -> Stage:
+        if distance not in stages and still:
+            arm = kept(last.share + distance)
+            balance = last.balance.under(arm.at)
+            stages[distance] = Stage(last.share + distance, balance(last.point.x), balance, arm)
         if distance not in stages:
             near = stages[min(stages, key=lambda known: abs(known - distance))]
             stages[distance] = _on_arc(kept, last, near, tangent, distance, length)
@@ -157,11 +161,12 @@ def _end_of_piece(model: Model, last: Stage, taut: Flags) -> tuple[Stage, int | 
         return np.append(F, least_eigenvalue(stage.balance, stage.point))
 
     low = 0.0
-    high = length * _FINEST * max(last.share, 1e-9)
+    high = (1.0 if still else length) * _FINEST * max(last.share, 1e-9)
+    farthest = last.share if still else FAR
     while (values(high) > 0.0).all():
         low = high
         high = 2.0 * high
-        if high > FAR:
+        if high > farthest:
             raise _LOST
     before = values(low)
     roots = {
