@@ -94,6 +94,7 @@ from cdsm.wires.elasticity import Elasticity as Elasticity
 from cdsm.wires.laws import LinearElasticity as LinearElasticity
 from cdsm.wires.laws import StrandElasticity as StrandElasticity
 from cdsm.wires.laws import TabulatedElasticity as TabulatedElasticity
+from cdsm.wires.ropes import RopeElasticity as RopeElasticity
 from cdsm.wires.tensile_fit import fit_tensile_test as fit_tensile_test
 from cdsm.wires.tensile_test import read_tensile_csv as read_tensile_csv
 

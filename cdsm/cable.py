@@ -28,6 +28,7 @@ from cdsm.support.validation import (
 from cdsm.support.values import Array
 from cdsm.wires.catalogue import label
 from cdsm.wires.elasticity import Elasticity, checked_law
+from cdsm.wires.ropes import breaking_force
 
 Control = Literal["position", "force"]
 
@@ -302,6 +303,28 @@ def _path(cable: Cable) -> tuple[float, list[object]]:
         (element.link, element.position) if isinstance(element, Site) else element
         for element in cable.sites
     ]
+
+
+def breaking_forces(cables: Sequence[Cable]) -> Array:
+    """Return the least breaking forces (C,) [N] of ropes; NaN for wires without one."""
+    return np.array([breaking_force(cable.elasticity) for cable in cables])
+
+
+def largest_share(cables: Sequence[Cable], tension: Array) -> str:
+    """Describe which cable comes nearest to its breaking force, of tensions (…, C) [N].
+
+    The text is empty if no breaking force is known.
+    """
+    shares = tension / breaking_forces(cables)
+    if np.isnan(shares).all():
+        return ""
+    c = int(np.unravel_index(np.nanargmax(shares), shares.shape)[-1])
+    force = breaking_force(cables[c].elasticity)
+    most = float(np.nanmax(shares))
+    return (
+        f"largest share of a breaking force: {cables[c].name}, {most * force:.4g} N of {force:.4g} "
+        f"N, {100.0 * most:.3g} %" + ": THE ROPE BREAKS" * (most >= 1.0)
+    )
 
 
 def wires_text(cables: Sequence[Cable]) -> str:

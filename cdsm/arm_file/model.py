@@ -25,7 +25,16 @@ from cdsm.support.files import read_text
 from cdsm.support.records import EACH, ONE, CrossFaults, laid_over, read_toml, record
 from cdsm.support.validation import gravity_vector, one_of
 from cdsm.tolerances import Tolerances, tolerances_from
-from cdsm.wires.catalogue import WIRES, Wire, as_wire, from_table, is_file, read_law, table_of
+from cdsm.wires.catalogue import (
+    WIRES,
+    Wire,
+    as_wire,
+    from_table,
+    is_file,
+    law_of_name,
+    read_law,
+    table_of,
+)
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity
 
@@ -146,9 +155,8 @@ def _law_of(wire: Any, known: Mapping[str, Any]) -> Elasticity:
     if not isinstance(wire, str):
         return as_wire(wire)
     # with faulty tables of wires, any name is right
-    laws: dict[str, Elasticity] = WIRES | known.get("wires", {wire: _NO_WIRE})
     remedy = "Or give EA in N, a file WIRE.toml, or a table [wires.NAME]."
-    return laws[one_of("wire", wire, laws, remedy)]
+    return law_of_name(wire, known.get("wires", {wire: _NO_WIRE}), remedy)
 
 
 _Gravity = Annotated[
@@ -282,8 +290,9 @@ class ArmFile(_Settings, _Wires):
 
     Attributes:
         gravity: Vector in base axes [m/s²], or an axis such as ``"-z"``, along which it is 9.81.
-        wire: Wire of all cables: a name, a constant EA [N], a file of ``cdsm fit``, or the NAME of
-            a table ``[wires.NAME]``.
+        wire: Wire of all cables: a name, also of a rope such as ``"7x7-0.8mm"``, a constant EA [N],
+            a file of ``cdsm fit``, or the NAME of a table ``[wires.NAME]``. A rope whose breaking
+            load is known: ``{rope = "7x7", diameter = 0.8e-3, breaking_load = 390}``.
         slack_below: ``true`` continues the law of the wire below its lowest tension, down to 0.
         friction: Coefficient of friction in all holes [-].
         wires: Tables ``[wires.NAME]``, laws of wires: the lines of a file of ``cdsm fit``.

@@ -20,7 +20,8 @@ JointType = Literal["universal", "hinged"]
 _JOINTS = (
     "Number of joints, default 4; several: of sections, each a quarter narrower than the last."
 )
-_WIRE = "Wire of all cables: a name, a constant EA in N, or a file of `cdsm fit`. Default: "
+_WIRE = "Wire of all cables: a name, a rope such as 7x7-0.8mm (1x7, 1x19, 7x7, 7x19, uhmwpe), a "
+_WIRE += "constant EA in N, or a file of `cdsm fit`. Default: "
 _WIRE += "1x19-1.2mm; with --from, that of the cables."
 _FROM = "A robot, with --cables and --tip; or the folder of a CASPR model, with --wire."
 _INERTIA = "Accept moments of inertia that no body can have."
@@ -47,6 +48,7 @@ def new(
     from cdsm.arm_file.arm import template
     from cdsm.support.files import write_text
     from cdsm.wires.catalogue import is_file
+    from cdsm.wires.ropes import describe
 
     if arm.exists() and not overwrite:
         raise misuse("ARM.toml", f"{arm} exists; add --overwrite.")
@@ -74,7 +76,9 @@ def new(
     bent = min([10.0, *(high[~made.slides] / 2.0).tolist()])
     inside = [bent if a <= bent <= b else (a + b) / 2.0 for a, b in zip(low, high, strict=True)]
     asked = ",".join(f"{each:.3g}" for each in (inside[:1] if {*inside} == {bent} else inside))
-    tried = f"written: {arm}; try cdsm stiffness {arm} --angles {asked} --check"
+    about = dict.fromkeys(filter(None, (describe(cable.elasticity) for cable in made.cables)))
+    tried = "\n".join([*about, ""]) if about else ""
+    tried += f"written: {arm}; try cdsm stiffness {arm} --angles {asked} --check"
     return answer(as_json, _facts(made, arm), made, tried)
 
 

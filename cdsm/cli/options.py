@@ -59,10 +59,11 @@ ArmArgument = Annotated[
 SetOption = Annotated[list[str] | None, opt(_SET, "KEY=VALUE", "--set")]
 AnglesOption = Annotated[str | None, opt(_ANGLES, "DEG,...")]
 PathOption = Annotated[Path | None, opt(_PATH, "PATH.csv", "--path")]
-_PULL = "Wire [mm] that each motor takes in, from straight cables at the rest of the springs."
-TensionOption = Annotated[
-    str | None, opt("Tension [N] that each motor holds; the posture follows.", "N,...", "--tension")
-]
+_PULL = "Wire [mm] that each motor takes in, from straight cables at the rest of the springs; one "
+_PULL += "each, or by name (cable1_1=5,…; others are loose)."
+_TENSION = "Tension [N] that each motor holds; the posture follows. One each, or by name "
+_TENSION += "(cable1_1=20,…; others are loose)."
+TensionOption = Annotated[str | None, opt(_TENSION, "N,...", "--tension")]
 PullOption = Annotated[str | None, opt(_PULL, "MM,...")]
 MinimumOption = Annotated[
     float, opt("Lower bound of all tensions [N], besides those of ARM.toml.", "N")
@@ -161,8 +162,27 @@ def joint_coordinates(text: str | None, arm: cdsm.Manipulator) -> Array:
     return joint_scales(arm) * [scalar(f"--angles of {name}", value) for name, value in pairs]
 
 
+def by_cable(
+    option: str, text: str, arm: cdsm.Manipulator, scale: float
+) -> list[float] | dict[str, float]:
+    """Return the numbers of --tension or --pull in SI: one for each cable, or some by name."""
+    names = arm.cables.names
+    form = f"one for each of {', '.join(names)}, or some by name: {names[0]}=10"
+    if "=" not in text:
+        return [scale * value for value in parse_numbers(option, text, (len(names),), form)]
+    entries = by_name(option, text, "cable", names, "CABLE=VALUE,...")
+    return {
+        name: scale * parse_numbers(option, value, (1,), form)[0] for name, value in entries.items()
+    }
+
+
 def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[str, str]:
     """Split ``JOINT=VALUE,...`` into values by joint; the ``form`` is for the message."""
+    return by_name(option, text, "joint", arm.joint_names, form)
+
+
+def by_name(option: str, text: str, kind: str, names: Sequence[str], form: str) -> dict[str, str]:
+    """Split ``NAME=VALUE,...`` into values by the name of a joint or cable (``kind``)."""
     from cdsm.support.validation import one_of
 
     values: dict[str, str] = {}
@@ -170,7 +190,7 @@ def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[s
         name, equals, value = (part.strip() for part in entry.rpartition("="))
         if not equals:
             raise misuse(option, f"{entry!r} given; {form} is needed.")
-        if one_of("joint", name, arm.joint_names) in values:
+        if one_of(kind, name, names) in values:
             raise misuse(option, f"{name} is given twice.")
         values[name] = value
     return values

@@ -151,6 +151,7 @@ def sweep_postures(
 
     Exit code 0; 3 if no entry has the status ok, or the map is empty.
     """
+    from cdsm.cable import largest_share
     from cdsm.support.status import status_names
     from cdsm.support.validation import XYZ
     from cdsm.sweeps.cases import DEFAULT
@@ -199,6 +200,9 @@ def sweep_postures(
     entries = sum(counts.values())
     if not counts.get("ok"):
         warnings.append(f"no posture could be evaluated: {listed}")
+    if "tension" in dataset and (share := largest_share(robot.cables, dataset["tension"].values)):
+        lines.append(share)
+        numbers |= {"largest_share_of_breaking_force": share}
     lines += curve_lines(dataset.isel(pose=0)) if at_one else quantile_lines(dataset)
     least = min(low)
     status = status.reshape(-1, len(low))[:, low.index(least)]

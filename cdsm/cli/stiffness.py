@@ -51,6 +51,7 @@ def show_stiffness(
 
     Exit code 0; 3 if the arm is unstable, or the report of --check fails.
     """
+    from cdsm.cable import largest_share
     from cdsm.support.files import write_text
 
     robot = options.load_arm(arm, changes)
@@ -64,6 +65,9 @@ def show_stiffness(
         k = (rest or K).along(u)
         numbers |= {"direction": u, "along_direction_N_per_m": k}
         lines.append(f"along {direction}: {k / 1e3:.4g} N/mm")
+    share = largest_share(K.posture.arm.cables, K.tension)
+    numbers |= {"largest_share_of_breaking_force": share} if share else {}
+    lines += [share] if share and K.distribution is None else []  # a Tension prints it itself
     sure, uncertainty = _uncertainty(K.distribution, axes)
     if check or out is not None:
         report = (rest or K).report()
@@ -101,12 +105,11 @@ def _balanced(
         remedy = "say what the motors do, and the posture follows: give one of them, without "
         raise misuse("--tension, --pull", f"{remedy}--angles, --minimum and --maximum.")
     option, text = ("--tension", tension) if pull is None else ("--pull", pull)
-    form = f"one for each cable: {', '.join(arm.cables.names)}"
-    values = options.parse_numbers(option, text or "", (len(arm.cables),), form)
+    values = options.by_cable(option, text or "", arm, 1.0 if pull is None else 1e-3)
     if pull is None:
         rest = cdsm.forward_statics(arm, tension=values, wrench=wrench)
     else:
-        rest = cdsm.forward_statics(arm, pull=[value / 1e3 for value in values], wrench=wrench)
+        rest = cdsm.forward_statics(arm, pull=values, wrench=wrench)
     return rest.stiffness, rest
 
 
@@ -136,14 +139,16 @@ def _uncertainty(
 ) -> tuple[list[str], Json]:
     """Return the uncertainty along each axis in which the tip can move, as a table and for JSON."""
     from cdsm.support.format import aligned
+    from cdsm.tolerancing.budget import known_tolerances
 
     budgets: dict[str, Uncertainty] = {}
-    if tension is None or not tension.posture.arm.tolerances.given:
+    tolerances = None if tension is None else known_tolerances(tension.posture.arm)
+    if tension is None or tolerances is None or not tolerances.given:
         return [], {}
     pose = tension.posture
     for name, u in axes.items():
         with contextlib.suppress(cdsm.SingularStiffness):
-            budgets[name] = cdsm.uncertainty(pose, tension, pose.arm.tolerances, direction=u)
+            budgets[name] = cdsm.uncertainty(pose, tension, tolerances, direction=u)
     if not budgets:
         return [], {}
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
+from cdsm.cable import breaking_forces, largest_share
 from cdsm.errors import InvalidInput, solver_failed
 from cdsm.posture import Posture
 from cdsm.status import Status
@@ -68,6 +69,11 @@ class Tension(Result, IndexedByName):
         torque = self.values @ self.posture.length_jacobian
         return frozen(torque - required_torque(self.posture, self.wrench))
 
+    @quantity("1", "cable")
+    def breaking_share(self) -> Array:
+        """Tension over the least breaking force of the rope (C,) [-]; NaN for wires without one."""
+        return frozen(self.values / breaking_forces(self.posture.arm.cables))
+
     def keys(self) -> tuple[str, ...]:
         """Return the names of the cables, in the order of :attr:`values`."""
         return self.posture.arm.cables.names
@@ -104,6 +110,7 @@ class Tension(Result, IndexedByName):
     def __str__(self) -> str:
         rows = aligned([("cable", "tension [N]"), *((c, f"{self[c]:.3f}") for c in self)])
         unit = self.posture.arm.torque_unit()
+        rows += [share] if (share := largest_share(self.posture.arm.cables, self.values)) else []
         return "\n".join([*rows, f"static residual: {abs(self.residual).max():.1e} {unit}"])
 
 

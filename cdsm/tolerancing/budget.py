@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.batch.quantities import Codes
 from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.stiffness_matrix.prints import verdict
@@ -22,9 +23,10 @@ from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import Direction, fraction, instance
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
-from cdsm.tolerances import Tolerances, sources
+from cdsm.tolerances import Tolerance, Tolerances, sources
 from cdsm.tolerancing.inputs import Errors, Group
 from cdsm.tolerancing.measurand import Measurand, measurand_of
+from cdsm.wires.ropes import construction_of
 
 _LINEAR = 0.05  # largest nonlinearity with which first order is taken as sufficient
 _DRAWN = 100  # random arms that show how far from linear a measurand is
@@ -191,7 +193,8 @@ def uncertainty(
     Args:
         pose: The posture.
         tension: A :class:`~cdsm.Tension`, or your own tensions (C,) [N].
-        tolerances: Tolerances of the arm, the angles and the tensions; None: those of the arm.
+        tolerances: Tolerances of the arm, the angles and the tensions; None: those of the arm, with
+            the scatter of EA of its ropes.
         direction: u in base axes, for ``"along"`` and ``"tip_along"`` only.
         of: ``"along"``: the stiffness along u [N/m], without friction. ``"margin"``: the
             smallest eigenvalue of K_θ [N m/rad]. ``"tip_along"``: the tip's coordinate along u [m].
@@ -214,7 +217,7 @@ def uncertainty(
 
 def budget_of(measurand: Measurand, tolerances: Tolerances | None) -> Uncertainty:
     """Compute the budget of a measurand; ``tolerances`` are as for :func:`uncertainty`."""
-    used = measurand.stiffness.posture.arm.tolerances
+    used = known_tolerances(measurand.stiffness.posture.arm)
     if tolerances is not None:
         used = instance("tolerances", tolerances, Tolerances)
     elif not used.given:
@@ -240,6 +243,26 @@ def budget_of(measurand: Measurand, tolerances: Tolerances | None) -> Uncertaint
         contributions=dict(sorted(parts.items(), key=lambda part: -part[1])),
         nonlinearity=float(np.sqrt(np.mean(left[exist] ** 2))) / scale if exist.any() else 0.0,
         failed=int(np.count_nonzero(~exist)),
+    )
+
+
+def known_tolerances(arm: Manipulator) -> Tolerances:
+    """Return the tolerances of an arm; of a rope, EA has the scatter of its construction.
+
+    The scatter is one error for all cables of a rope, as of one spool. Tolerances of the arm that
+    have a ``rigidity`` stay as they are.
+    """
+    if arm.tolerances.rigidity:
+        return arm.tolerances
+    rows = {cable.name: construction_of(cable.elasticity) for cable in arm.cables}
+    scatters = {name: row.scatter for name, row in rows.items() if row}
+    if not scatters:
+        return arm.tolerances
+    if len(scatters) == len(rows) and len(set(scatters.values())) == 1:
+        (scatter,) = set(scatters.values())
+        return arm.tolerances.replace(rigidity=scatter)
+    return arm.tolerances.replace(
+        rigidity=[Tolerance(u, correlation=1.0, of=name) for name, u in scatters.items()]
     )
 
 

@@ -20,6 +20,7 @@ from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.values import Array
 from cdsm.view.scene import ELLIPSOID, FORCE, SLIDES, STICKS, Scene
 from cdsm.view.state import Color, Setting, Shown
+from cdsm.wires.ropes import breaking_force
 
 if TYPE_CHECKING:
     import viser
@@ -271,7 +272,11 @@ def _numbers(shown: Shown) -> Iterator[tuple[str, str, str]]:
         for name, c in (("smallest", tensions.argmin()), ("largest", tensions.argmax())):
             cable = escaped(pose.arm.cables[c].name)
             swatch = _swatch(shown.cable_colors[c])
-            yield f"{name} tension, {swatch} {cable}", f"{tensions[c]:.4g}", "N"
+            force = breaking_force(pose.arm.cables[c].elasticity)
+            share = (
+                "" if math.isnan(force) else f" ({100.0 * tensions[c] / force:.3g} % of breaking)"
+            )
+            yield f"{name} tension, {swatch} {cable}", f"{tensions[c]:.4g}", f"N{share}"
 
 
 def _table(rows: Iterable[tuple[str, str, str]]) -> str:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from inspect import signature
 from pathlib import Path
 from typing import Any, Final, TypeGuard
 
-from cdsm.errors import LINES, FileError, GeometryError, InvalidInput, did_you_mean, listed
+from cdsm.errors import LINES, FileError, GeometryError, InvalidInput, did_you_mean, listed, unknown
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import read_toml, toml_text
-from cdsm.support.validation import flag, one_of
+from cdsm.support.validation import flag
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity, StrandElasticity, TabulatedElasticity
+from cdsm.wires.ropes import RopeElasticity, names_like, rope_name, rope_of_name
 
 STRAND: Final = StrandElasticity.eq19_repaired()
 """The paper's 1×19 steel strand of 1.2 mm (Section IV-C): Eq. 19, repaired and continuous."""
@@ -26,6 +27,7 @@ WIRES: Final[dict[str, Elasticity]] = {"1x19-1.2mm": STRAND, "solid-1.2mm": SOLI
 
 _KINDS: Final[dict[str, Callable[..., Elasticity]]] = {
     "linear": LinearElasticity,
+    "rope": RopeElasticity,
     "strand": StrandElasticity,
     "tabulated": TabulatedElasticity,
 }
@@ -33,11 +35,12 @@ _HEAD: Final = "# Elasticity of a wire: tensions and rigidity in N, strains with
 _MEASURED: Final = ".csv", ".txt", ".tsv"  # files of measured points
 
 Wire = Elasticity | str | float | os.PathLike[str]
-"""Ways to give a wire: its law, a name of :data:`WIRES`, EA [N], or the path of a WIRE.toml."""
+"""Ways to give a wire: its law, a name of :data:`WIRES`, that of a rope such as ``7x7-0.8mm``, EA
+[N], or the path of a WIRE.toml."""
 
 
 def as_wire(wire: Wire) -> Elasticity:
-    """Return the law of a wire: itself, by a name of :data:`WIRES`, EA [N], or a WIRE.toml.
+    """Return the law of a wire: itself, by a name, EA [N], or a WIRE.toml.
 
     Raises InvalidInput (also for another type, or EA outside its range) or FileError.
     """
@@ -46,10 +49,20 @@ def as_wire(wire: Wire) -> Elasticity:
     if is_file(wire) or isinstance(wire, os.PathLike):
         return read_law(wire)
     if isinstance(wire, str):
-        return WIRES[one_of("wire", wire, WIRES, "Or give EA in N, or a file WIRE.toml.")]
+        return law_of_name(wire, {}, "Or give EA in N, or a file WIRE.toml.")
     if isinstance(wire, bool) or not isinstance(wire, (int, float)):
         raise InvalidInput("wire", f"{wire!r} given; give a name, EA in N, or a file.")
     return LinearElasticity(wire)
+
+
+def law_of_name(name: str, others: Mapping[str, Elasticity], remedy: str) -> Elasticity:
+    """Return the law of a wire of :data:`WIRES`, of ``others``, or of a rope; or InvalidInput."""
+    laws = {**WIRES, **others}
+    if name in laws:
+        return laws[name]
+    if rope := rope_of_name(name):
+        return rope
+    raise unknown("wire", name, [*laws, *names_like(name)], remedy)
 
 
 def is_file(wire: object) -> TypeGuard[str]:
@@ -79,8 +92,8 @@ def table_of(law: Elasticity) -> dict[str, Any]:
         problem = f"{law!r} was made from a function. Tabulate its strain to save it."
         raise InvalidInput("elasticity", problem)
     table = {"kind": law.kind, **law.arguments}
-    if law.constant_rigidity or law.factor != 1.0:
-        table["rigidity" if law.constant_rigidity else "factor"] = law.factor
+    if law.kind == "linear" or law.factor != 1.0:
+        table["rigidity" if law.kind == "linear" else "factor"] = law.factor
     return table | ({"slack_below": True} if law.low < law.rest else {})
 
 
@@ -88,11 +101,17 @@ def from_table(table: object) -> Elasticity:
     """Build a law from a parsed TOML table; GeometryError lists what is wrong with it."""
     entries: dict[str, Any] = dict(table) if isinstance(table, dict) else {"kind": table}
     usual: dict[str, Any] = {"kind": None, "factor": 1.0, "slack_below": False}
+    if "rope" in entries:
+        usual["kind"] = "rope"
     kind, factor, slack = (entries.pop(key, value) for key, value in usual.items())
     if kind not in [*_KINDS]:
         raise GeometryError([f"kind: must be one of {', '.join(_KINDS)}, but is {kind!r}"])
-    keys = [*signature(_KINDS[kind]).parameters]
-    missing = [key for key in keys if key not in entries]
+    parameters = signature(_KINDS[kind]).parameters
+    keys = [*parameters]
+    required = [
+        key for key, parameter in parameters.items() if parameter.default is parameter.empty
+    ]
+    missing = [key for key in required if key not in entries]
     others = [(key, did_you_mean(key, keys)) for key in entries if key not in keys]
     faults = [f"{key}: is missing" for key in missing]
     faults += [f"{key}: is not a key of a {kind} law{meant}" for key, meant in others]
@@ -108,18 +127,26 @@ def from_table(table: object) -> Elasticity:
 
 
 def name_of(law: Elasticity) -> str | None:
-    """Return the name under which :data:`WIRES` has a law, or None if it does not have it."""
-    return next((name for name, known in WIRES.items() if known == law), None)
+    """Return the name of a law, by which :func:`as_wire` finds it, or None if it has none."""
+    named = next((name for name, known in WIRES.items() if known == law), None)
+    rope = rope_name(law)
+    return named or (None if rope in WIRES else rope)
 
 
 def diameter_of(law: Elasticity) -> float | None:
-    """Return the diameter [m] of a wire of :data:`WIRES`, with which its name ends, or None."""
+    """Return the diameter [m] of a rope, or that with which the name of a wire ends, or None."""
+    if law.kind == "rope":
+        return float(law.arguments["diameter"])
     name = name_of(law)
     return None if name is None else 1e-3 * float(name.rpartition("-")[2].removesuffix("mm"))
 
 
 def label(law: Elasticity) -> str:
     """Return a short text for a law: the name of its wire, its EA, or its kind and tensions."""
+    if law.kind == "rope":
+        sizes = law.arguments
+        rope = f"{sizes['rope']} of {1e3 * sizes['diameter']:g} mm"
+        return name_of(law) or f"{rope}, EA {law.constant_rigidity:.6g} N"
     if law.constant_rigidity or name_of(law):
         return name_of(law) or f"EA {law.constant_rigidity:.6g} N"
     text = f"{law.kind or 'function'}, {law.rest:.4g} to {law.high:.4g} N"

@@ -172,15 +172,18 @@ class Elasticity(Plotted):
         return hash((self.kind, self.factor, self.low, self.high))
 
     def __repr__(self) -> str:
-        values = self.arguments | ({"rigidity": self.factor} if self.constant_rigidity else {})
+        linear = self.kind == "linear"
+        values = self.arguments | ({"rigidity": self.factor} if linear else {})
         text = ", ".join(f"{name}={value!r}" for name, value in values.items())
-        scaled = "" if self.constant_rigidity or self.factor == 1.0 else f".scaled({self.factor!r})"
+        scaled = "" if linear or self.factor == 1.0 else f".scaled({self.factor!r})"
         slack = ".slack_below()" * (self.low < self.rest)
         return f"{self.kind.capitalize()}Elasticity({text}){scaled}{slack}"
 
     @property
     def constant_rigidity(self) -> float | None:
         """EA [N] if it is the same at all tensions."""
+        if self.kind == "rope":
+            return float(self.factor / self._coefficients[1, 0])
         return self.factor if self.kind == "linear" else None
 
     @property

@@ -31,7 +31,8 @@ EQ19: Final = (
 )
 """Coefficients of Eq. 19 with more digits, so that the branches meet; see eq19_repaired."""
 _MEET: Final = 1e-9  # relative difference of two polynomials at their join that is rounding
-_LINE: Final = np.array([0.0, RANGES["tension"].high]), np.array([[0.0], [1.0]])
+LINE: Final = np.array([0.0, RANGES["tension"].high]), np.array([[0.0], [1.0]])
+"""Knots and coefficients of the strain of constant EA, times EA."""
 _CELLS: Final = 800  # pieces of a function EA(F), to 1e-9 of Eq. 19
 _ACCURACY: Final = 1e-8  # of EA between two knots
 _NEAR: Final = 1.0  # distance [N] from a join within which there is no knot
@@ -54,7 +55,7 @@ class LinearElasticity(Elasticity):
         if not 1e3 <= EA <= 1e9:
             doubt = "kN" if EA < 1e3 else "E instead of EA"
             warn(f"a wire with EA = {EA:g} N is unusual: {doubt}? EA is needed in N.")
-        super().__init__(0.0, math.inf, 0.0, "linear", {}, EA, *_LINE)
+        super().__init__(0.0, math.inf, 0.0, "linear", {}, EA, *LINE)
 
     @classmethod
     def of_wire(cls, young_modulus: float, diameter: float) -> LinearElasticity:
