@@ -316,6 +316,13 @@ class ArmFile(_Settings, _Wires):
     cables: Annotated[_Tables, WrapValidator(_built), Field(validate_default=True)] = None  # type: ignore[assignment]
 
 
+def _placed(fault: str, described: dict[str, Any]) -> str:
+    """Return the fault of a key at the top of a file; a key of the geometry is told its tables."""
+    key, unknown, _ = fault.partition(": is not a key that is known here")
+    places = toml.places_of(key, described) if unknown else []
+    return f"{key}{unknown}; it is one of {listed(places)}" if places else fault
+
+
 def read_model(
     path: str | os.PathLike[str],
     wire: Wire | None,
@@ -329,6 +336,7 @@ def read_model(
     """
     forced = None if wire is None else as_wire(wire)
     faults = ""
+    described: dict[str, Any] = {}
     try:
         data = _read_tables(path, changes, robot)
         described, rest = toml.split_geometry(data)
@@ -336,7 +344,7 @@ def read_model(
             data = {_ROBOT: described, **rest}
         file = records.parse(ArmFile, data)
     except GeometryError as error:
-        faults = listed(error.faults, 20, LINES)
+        faults = listed([_placed(fault, described) for fault in error.faults], 20, LINES)
     if faults:  # not inside except: its context could not be pickled
         what = ("an arm" if robot else "cables") + " with these changes" * bool(changes)
         raise FileError(path, f"cannot be read as {what}:{faults}")

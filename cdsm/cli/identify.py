@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import math
+from itertools import zip_longest
 from pathlib import Path
+from textwrap import wrap
 from typing import Annotated, Literal
 
 import typer
@@ -162,6 +164,12 @@ def _usual(name: str, value: float) -> Limits:
     return value / 2.0, 2.0 * value
 
 
+_WIDTHS = (34, 20, 20, 20)  # of the columns: the table fits a terminal of 100
+_VERDICTS = """\
+holds: within a fifth of the paper's number; sign only: the same direction, another size;
+misprint: a digit of the paper is wrong. Three numbers are x, y and z."""
+
+
 def reproduce(
     out: Annotated[Path, opt("Folder; default: reproduction.", "FOLDER")] = Path("reproduction"),
     kind: Annotated[Literal["pdf", "svg", "png"], opt("Of the figures.", None, "--format")] = "png",
@@ -188,7 +196,11 @@ def reproduce(
     numbers = paper.to_dict(results)
     text = json.dumps(numbers, indent=1, allow_nan=False)
     written.append(write_text(out / "reproduction.json", f"{text}\n"))
-    rows = [(f"{row[0]}: {row[1]}", *row[2:6]) for row in paper.to_rows(results)]
-    table = "\n".join(aligned([("quantity", *paper.HEADER[2:6]), *rows]))
+    rows: list[tuple[str, ...]] = [("quantity", "paper", "computed", "verdict")]
+    for figure, quantity, printed, computed, _, verdict, *_ in paper.to_rows(results):
+        cells = (f"{figure}: {quantity}", printed, computed, verdict)
+        pairs = zip(cells, _WIDTHS, strict=True)
+        rows += zip_longest(*(wrap(cell, width) for cell, width in pairs), fillvalue="")
+    table = "\n".join([*aligned(rows), "", _VERDICTS])
     summary = f"all numbers, and what each is: {out / 'reproduction.md'}"
     return answer(as_json, numbers, table, f"{summary}\nwritten: {', '.join(map(str, written))}")

@@ -33,6 +33,21 @@ def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
     return geometry, {key: value for key, value in data.items() if key not in known}
 
 
+def places_of(key: str, geometry: Mapping[str, Any]) -> list[str]:
+    """Return the tables of a geometry to which a key belongs: ``sections.1.universal``."""
+    tables = [("", geometry)]
+    sections = geometry.get("sections")
+    for i, section in enumerate(sections if isinstance(sections, list) else (), start=1):
+        if isinstance(section, dict):
+            tables.append((f"sections.{i}.", section))
+    return [
+        f"{where}{form}"
+        for where, table in tables
+        for form in table
+        if form in _FORMS and form != "sections" and key in _keys_of(form)
+    ]
+
+
 def _keys_of(form: str) -> set[str]:
     """Return the keys that belong to a form of geometries."""
     if form == "sections":

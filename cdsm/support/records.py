@@ -256,7 +256,9 @@ def laid_over(old: Any, new: Any, where: str = "") -> Any:
     entries = [entry if isinstance(entry, dict) else {} for entry in old]
     names = [str(entry.get("name", i)) for i, entry in enumerate(entries, start=1)]
     unknown = [
-        f"{where}{key}: there is only {listed(names, 12)}" for key in new if key not in names
+        f"{where}{key}: there is only {listed(names, 12)}; tables are counted from 1"
+        for key in new
+        if key not in names
     ]
     if unknown:
         raise GeometryError(unknown)

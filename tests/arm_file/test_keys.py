@@ -5,6 +5,8 @@ from dataclasses import fields
 from inspect import signature
 from pathlib import Path
 
+import pytest
+
 import cdsm
 from cdsm.arm_file.model import ArmFile, Urdf
 from cdsm.cable import SETTINGS
@@ -12,6 +14,7 @@ from cdsm.geometry.beams import Section
 from cdsm.tolerances import sources
 
 DOCS = Path(__file__).parents[2] / "docs"
+SNAKE = Path(__file__).parents[1] / "data" / "snake.toml"
 
 
 def test_the_page_has_every_key() -> None:
@@ -26,3 +29,12 @@ def test_the_page_has_every_key() -> None:
         expected |= {*signature(form).parameters}
     assert expected - keys == set()
     assert all(row.split(" | ")[2].strip(" |") for row in table.splitlines()[2:])
+
+
+def test_a_key_beside_its_table_is_told_where_it_belongs() -> None:
+    with pytest.raises(cdsm.FileError, match=r"it is one of sections\.1\.universal, sections\.2"):
+        cdsm.Manipulator.read(SNAKE, changes={"link_mass": -0.1})
+    with pytest.raises(cdsm.FileError, match="did you mean 'minimum'"):
+        cdsm.Manipulator.read(SNAKE, changes={"minimun": 5})
+    with pytest.raises(cdsm.FileError, match="only 1, 2; tables are counted from 1"):
+        cdsm.Manipulator.read(SNAKE, changes={"sections": {"0": {"phase": 0.1}}})
