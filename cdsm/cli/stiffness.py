@@ -16,6 +16,8 @@ from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from cdsm.measures.holding import Holding
+    from cdsm.measures.payload import Payload
     from cdsm.statics.buckling import CriticalLoad, CriticalTension
     from cdsm.statics.equilibrium import Equilibrium
     from cdsm.statics.load_cycle import LoadHistory
@@ -187,11 +189,13 @@ def weigh(
     mass: options.MassOption = None,
     steps: Annotated[int | None, opt("Steps to the full load.", "N", min=1, max=1000)] = None,
     cycles: Annotated[int | None, opt("Load and unload N times.", "N", min=1, max=100)] = None,
-    out: Annotated[Path | None, file_opt("Table of --cycles.", "FILE.nc|csv", "--out")] = None,
+    out: Annotated[
+        Path | None, file_opt("Table of --cycles; .nc: all states.", "FILE.nc|csv", "--out")
+    ] = None,
     figure: options.FigureOption = None,
     as_json: options.JsonOption = False,
 ) -> int:
-    """Hang a weight at the tip, and find how far it moves.
+    """Hang a weight at the tip: how far it moves, and how much more the arm holds.
 
     The motors are locked (Eq. 20), or go on as --tension or --pull say; --load and --mass are the
     weight, in 5 steps (12 in each quarter of --cycles). With friction in the holes, small and large
@@ -203,16 +207,23 @@ def weigh(
     """
     if out is not None and cycles is None:
         raise misuse("--out", "is the table of --cycles; give both.")
+    from cdsm.support.format import coordinates, without_rounding
+
     robot = options.load_arm(arm, changes)
     weight = _weight(robot, load, mass)
     K, rest = _balanced(robot, [0.0] * 6, angles, minimum, maximum, tension, pull)
     pose = K.posture
     start = rest or K.tension
     head, numbers = header(pose, [] if rest else [minimum], "included")
+    held: Holding | None = None
+    holds_tensions = rest is not None and rest.motors == "tension"
+    motors = "hold the tensions" if holds_tensions else "locked: they hold the wire"
+    head = f"motors {motors}\n{head}"
+    numbers["motors"] = "tension" if holds_tensions else "locked"
     result: WeightTest | LoadHistory
     if cycles is not None:
         result, more, note = _cycles(pose, start, weight, cycles, steps or 12)
-        write(out, result.write)
+        write(out, result.write_loop if out and out.suffix.lower() == ".csv" else result.write)
     elif weight[3:].any():
         raise misuse(
             "--load", "has a moment, but a weight is a force: FX,FY,FZ. --cycles takes moments."
@@ -220,8 +231,14 @@ def weigh(
     else:
         more = {}
         result = cdsm.weight_test(pose, start, weight[:3], steps=steps or 5)
+        if rest is None:
+            held = cdsm.payload(pose, weight[:3], minimum, maximum, tension=K.tension).locked
+            more = {"holds": held}
         without = " without friction" if pose.arm.has_friction else ""
-        note = f"at the full load{without}:\n{result.states[-1]}"
+        note = f"at the full load{without}:\n{result.states[-1]}\n\n{held or ''}".rstrip()
+        if pose.arm.has_friction:
+            moved = coordinates(without_rounding(1e3 * result.displacement))
+            note += f"\nwith friction, at the full load: tip moved by {moved} mm"
     write_picture(figure, result.plot)
     warnings = (*K.warnings, *(rest.warnings if rest else ()), *result.warnings)
     output = numbers | ({"rest": rest} if rest else {}) | result.to_dict() | more
@@ -279,7 +296,9 @@ def buckle(
 ) -> int:
     """Find the tension and the load at which the arm buckles.
 
-    Of a load by --load and --mass it is the largest multiple, within --minimum and --maximum.
+    The motors follow: they keep the posture with the least tensions. Of a load by --load and
+    --mass it is the largest multiple, within --minimum and --maximum; beside it stands what the
+    arm holds with locked motors.
 
     Exit code 0; 3 if the arm is unstable at every tension, or already without the load.
     """
@@ -288,11 +307,15 @@ def buckle(
         raise misuse("--minimum, --maximum", "bound the tensions under --load or --mass: give one.")
     pose = options.posture(arm, changes, angles)
     tension = cdsm.critical_tension(pose)
-    results: dict[str, CriticalTension | CriticalLoad] = {"critical_tension": tension}
+    results: dict[str, CriticalTension | CriticalLoad | Payload] = {"critical_tension": tension}
     if loaded:
         wrench = _weight(pose.arm, load, mass)
         results["critical_load"] = cdsm.critical_load(pose, wrench, minimum, maximum)
+        if not wrench[3:].any():
+            results["payload"] = cdsm.payload(pose, wrench[:3], minimum, maximum)
     write_picture(figure, tension.plot)
     head, numbers = header(pose, [minimum] if loaded else [])
+    head = f"motors follow: they keep the posture with the least tensions\n{head}"
+    numbers["motors"] = "follow"
     warnings = [warning for result in results.values() for warning in result.warnings]
     return answer(as_json, numbers | results, head, *results.values(), warnings=warnings)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import final
+from pathlib import Path
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +19,10 @@ from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
 from cdsm.statics.quasi_static import NO_PATH, EquilibriumPath, Load, QuasiStaticArm
 from cdsm.stiffness_matrix import FrictionState, Stiffness, checked_tension
+from cdsm.support.files import write_file
 from cdsm.support.format import without_rounding
 from cdsm.support.progress import show_progress
-from cdsm.support.result import Result, quantity, unit
+from cdsm.support.result import AXIS_NAMES, Result, data_frame, quantity, unit
 from cdsm.support.validation import WRENCH, instance, number_array, whole_number
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
@@ -132,6 +135,21 @@ class LoadHistory(Result, Plotted):
         W = frozen(self.wrenches[k].copy())
         friction: FrictionState = "sliding" if sliding.any() else "stuck"
         return assemble_segments(self.pose(k), T, sliding, W, friction)
+
+    def write_loop(self, path: str | os.PathLike[str]) -> Path:
+        """Write force, displacement, number of sliding holes and lost work as CSV; return the path.
+
+        One row per load; :meth:`write` writes all states. Raises CdsmError without pandas, and
+        FileError if the file cannot be written.
+        """
+        columns: dict[str, Any] = {}
+        for i, axis in enumerate(AXIS_NAMES):
+            columns[f"force {axis} [N]"] = self.wrenches[:, i]
+        for i, axis in enumerate(AXIS_NAMES):
+            columns[f"displacement {axis} [m]"] = self.displacement[:, i]
+        columns["sliding holes"] = np.count_nonzero(self.sliding, axis=1)
+        columns["dissipated [J]"] = self.dissipated
+        return write_file(path, data_frame(columns, "load", self.load).to_csv)
 
     def __str__(self) -> str:
         rows = [

@@ -303,7 +303,8 @@ def _buckled(model: Model, branch: list[Stage], watch: Watched, force: float) ->
     """Return the error of an arm that buckles before it bears ``force`` [N]."""
     *events, end = events_on(model, branch, watch, force, 1.0)
     before = f" ({'; '.join(map(str, events))})" if events else ""
-    problem = f"the arm buckles at {100.0 * end.share:.4g} % of the load, under {end.load:.4g} N"
+    motors = "motors that hold tensions" if branch[-1].arm.tension_held else "locked motors"
+    problem = f"with {motors} the arm buckles at {100.0 * end.share:.4g} % of the load, under {end.load:.4g} N"
     residual = branch[-1].point.state.residual
     return EquilibriumError(
         f"{problem}: {end.place} buckles{before}", residual, end.share, end.place

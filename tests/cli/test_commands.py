@@ -165,7 +165,14 @@ def test_weigh(probe: Path, pose: cdsm.Posture, tmp_path: Path) -> None:
     history = cdsm.load_cycle(rough, cdsm.distribute_tension(rough, 30.0), wrenches + 0.0)
     assert_holds(found, history)
     assert found["lost_in_last_cycle_J"] == pytest.approx(history.dissipated.sum())
-    assert len(table.read_text(encoding="utf-8").splitlines()) == 9
+    rows = table.read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 9
+    assert rows[0].split(",")[:4] == ["load", "force x [N]", "force y [N]", "force z [N]"]
+    assert float(rows[2].split(",")[6]) == pytest.approx(history.displacement[1, 2])
+    assert call(*asked, "--load", "0,0,-3").stdout.startswith("motors locked")
+    rough_text = call(*asked, "--load", "0,0,-3", "--set", "friction=0.1").stdout
+    last = cdsm.weight_test(rough, tension.values, (0, 0, -3), steps=5).displacement
+    assert f"{1e3 * last[2]:.4g}) mm" in rough_text.splitlines()[-1]
 
 
 def test_buckle(probe: Path, pose: cdsm.Posture) -> None:
@@ -177,6 +184,11 @@ def test_buckle(probe: Path, pose: cdsm.Posture) -> None:
     load = cdsm.critical_load(arm, [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 3.0)
     assert found["critical_tension"] == prepare_json(cdsm.critical_tension(arm).to_dict())
     assert found["critical_load"] == prepare_json(load.to_dict())
+    held = cdsm.payload(arm, "-x", 3.0)
+    assert held.following is not None
+    assert found["payload"]["following"]["force_N"] == held.following.force
+    assert held.following.force == pytest.approx(load.factor, rel=1e-6)
+    assert call("buckle", probe, *soft).stdout.startswith("motors follow")
 
 
 def test_plan_at_a_posture(probe: Path, pose: cdsm.Posture, tmp_path: Path) -> None:
