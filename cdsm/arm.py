@@ -189,6 +189,14 @@ class ComputedArm(Printed):
         """Unit of each joint's coordinate (nv,): rad, or m for a prismatic joint."""
         return self.body.joint_units
 
+    @cached_property
+    def levers(self) -> Array:
+        """Lever of each joint (nv,): 1 if it turns, the arm's length [m] if it slides.
+
+        A torque times it is in N m for all joints; a stiffness is multiplied twice.
+        """
+        return frozen(np.where(self.slides, self.length, 1.0))
+
     def torque_unit(self, joint: int | None = None) -> str:
         """Return the unit of torque of a joint or, if None, of a number of all joints.
 

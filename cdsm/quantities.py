@@ -81,6 +81,8 @@ class Quantity(NamedTuple):
         return self.words.replace("a direction", direction)
 
 
+_SOFT: Final = 100.0  # [N/m]; stiffness below is read in N/m
+
 _BATCH: Final[frozenset[Output]] = frozenset(("batch",))
 _SWEEP: Final[frozenset[Output]] = frozenset(("sweep",))
 _DESIGN: Final[frozenset[Output]] = frozenset(("design",))
@@ -252,6 +254,15 @@ def _described(name: str, texts: Mapping[str, str]) -> list[str]:
 def display_of(unit: str) -> tuple[str, float]:
     """Return the unit in which people read a value, and its size in SI."""
     return DISPLAY.get(unit, (unit, 1.0))
+
+
+def display_for(unit: str, largest: float) -> tuple[str, float]:
+    """Return the unit, and its size in SI, in which people read values up to ``largest`` [SI].
+
+    The stiffness of soft arms is read in N/m.
+    """
+    soft = unit == "N/m" and 0.0 < largest < _SOFT
+    return (unit, 1.0) if soft else display_of(unit)
 
 
 def si_of(units: str) -> str:

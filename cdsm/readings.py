@@ -15,7 +15,10 @@ from cdsm.support.values import Array
 
 REGULAR = 1e-8  # least relative singular value of K_θ; its inverse has 6 correct digits there
 FLAT = 1e-6  # least relative singular value of J_v; a 3×3 stiffness has 4 correct digits there
+SLACK = 1e-9  # a cable is at 0 N if its tension is at most this part of the largest one
 UNMOVED = 1e-10  # the tip cannot move along u if all entries of J_vᵀ u are below this part of J_v's
+_ROUNDING = 1e-12  # a length changes if it does by more than this part of its summands
+_EXCHANGES = 10  # exchanges of all cables at once, without progress, before one at a time
 
 Mask = NDArray[np.bool_]
 
@@ -89,6 +92,87 @@ def along(inverse: Array, torque: Array, moves: Mask) -> tuple[Array, Array]:
     softness = (motion * torque).sum(axis=-1)
     with np.errstate(divide="ignore"):
         return np.where(moves, 1.0 / softness, np.inf), motion
+
+
+def slack_cables(tension: Array, cable_stiffness: Array) -> Mask:
+    """Return which cables (..., C) are at 0 N and have a stiffness: they can only add tension."""
+    largest = tension.max(axis=-1, keepdims=True, initial=0.0)
+    return np.asarray((tension <= SLACK * largest) & (cable_stiffness > 0.0))
+
+
+def without_cables(K: Array, J_L: Array, cable_stiffness: Array) -> Array:
+    """Compute K_θ − J_Lᵀ diag(k) J_L (..., n, n) for the stiffnesses k (..., C) of some cables."""
+    return np.asarray(K - (_transposed(J_L) * cable_stiffness[..., None, :]) @ J_L)
+
+
+def loose_cables(J_L: Array, slack: Mask, motion: Array) -> Mask:
+    """Return which of the ``slack`` cables (..., C) a joint motion (..., n) does not stretch."""
+    return np.asarray(slack & ((J_L @ motion[..., None])[..., 0] <= 0.0))
+
+
+def one_sided_along(
+    K: Array, magnitudes: Array, J_L: Array, slack: Array, torque: Array, moves: Mask
+) -> tuple[Array, Array, Mask]:
+    """Compute the stiffness (N, D) against forces along +u, where some cables are at 0 N.
+
+    These cables resist only what makes them longer. With K_0, which is K_θ without their
+    stiffnesses k, the motion x of the joints under the torque τ = J_vᵀ u solves
+
+        K_0 x + Σ_c k_c max(J_c x, 0) J_c = τ,        along = 1/(τᵀ x).
+
+    It is the least of ½ xᵀ K_0 x + ½ Σ_c k_c max(J_c x, 0)² − τᵀ x. With a moment in W, K_0 is not
+    symmetric and the equation has no potential; with c = k max(J x, 0) it is the linear
+    complementarity problem c ≥ 0, M c − J K_0⁻¹ τ ≥ 0 of M = diag(1/k) + J K_0⁻¹ Jᵀ. If the
+    symmetric part of K_0 is positive definite, M is a P-matrix and the solution is unique. It is
+    found by block pivoting (Júdice, Pires, Comput. Oper. Res. 21, 1994): cables that contradict
+    what was assumed of them change sides, all at once or, if that does not help, one by one.
+
+    Args:
+        K: K_θ (N, n, n).
+        magnitudes: Sum of the magnitudes of its terms (N, n, n).
+        J_L: Jacobian of the cable lengths (N, C, n).
+        slack: Stiffnesses k (N, C) of the cables at 0 N; 0 for all others.
+        torque: Joint torques τ = J_vᵀ u (N, D, n) of unit forces.
+        moves: What :func:`moves_tip` says of them (N, D).
+
+    Returns:
+        The stiffness (N, D), inf where the tip cannot move; the motion x (N, D, n) per force; and
+        where K_0 is not positive definite (N): there both are NaN.
+    """
+    K_0 = without_cables(K, J_L, slack)
+    both = _scale(magnitudes)
+    least = REGULAR * (magnitudes * both).max(axis=(-2, -1), initial=0.0)
+    buckles = np.asarray(~(margin(K_0 * both) > least))
+    motion = np.full(torque.shape, np.nan)
+    pulls = np.zeros((*moves.shape, slack.shape[-1]), dtype=np.bool_)
+    fewest = np.full(moves.shape, slack.shape[-1] + 1)
+    patience = np.full(moves.shape, _EXCHANGES)
+    rows, ways = np.nonzero(moves & ~buckles[:, None])
+    while rows.size:
+        J = J_L[rows]
+        k = slack[rows]
+        assumed = pulls[rows, ways]
+        stiffness = without_cables(K_0[rows], J, np.where(assumed, -k, 0.0))
+        x = np.linalg.solve(stiffness, torque[rows, ways][..., None])
+        change = (J @ x)[..., 0]
+        counts = (k > 0.0) & (abs(change) > _ROUNDING * (abs(J) @ abs(x))[..., 0])
+        wrong = counts & (assumed != (change > 0.0))
+        motion[rows, ways] = x[..., 0]
+        number = wrong.sum(axis=-1)
+        better = number < fewest[rows, ways]
+        fewest[rows, ways] = np.minimum(number, fewest[rows, ways])
+        patience[rows, ways] = np.where(better, _EXCHANGES, patience[rows, ways] - 1)
+        last = wrong & (np.cumsum(wrong, axis=-1) == number[:, None])
+        single = patience[rows, ways] < 0
+        pulls[rows, ways] ^= np.where(single[:, None], last, wrong)
+        rows, ways = rows[number > 0], ways[number > 0]
+    with np.errstate(divide="ignore"):
+        along = 1.0 / (motion * torque).sum(axis=-1)
+    along = np.where(moves, along, np.inf)
+    motion[~moves] = 0.0
+    along[buckles] = np.nan
+    motion[buckles] = np.nan
+    return along, motion, buckles
 
 
 def tip_motions(J_v: Array, directions: Array | None = None) -> TipMotions:

@@ -80,6 +80,16 @@ class Status(IntEnum):
     """An argument has a wrong type, shape or value (InvalidInput, GeometryError)."""
     FAILED = 21, "an error without a more precise cause"
     """Any other error."""
+    UNSTABLE_TO_ONE_SIDE = 22, "the arm buckles without the cables at 0 N"
+    """The arm is stable only if cables at 0 N are counted as taut; they only pull."""
+    AT_STOP = 23, "a joint rests on its stop"
+    """A joint rests on its stop, which carries a part of the load."""
+    UNBALANCED = 24, "the tensions do not balance the arm"
+    """The tensions do not balance the arm."""
+    ABOVE_MAXIMUM = 25, "a tension is above the maximum of its cable"
+    """A tension is above the maximum of its cable."""
+    SLACK = 26, "a cable is at 0 N, and can only add tension"
+    """A cable is at 0 N, and can only add tension."""
 
     @property
     def word(self) -> str:
@@ -89,7 +99,7 @@ class Status(IntEnum):
     @property
     def title(self) -> str:
         """The name as people read it: ``OUTSIDE ELASTICITY``."""
-        return self.name.replace("_", " ")
+        return "NOT IN BALANCE" if self is Status.UNBALANCED else self.name.replace("_", " ")
 
     @property
     def is_unmet(self) -> bool:

@@ -30,8 +30,8 @@ UNMET = 3
 INTERRUPTED = 130
 """Exit codes: an error; the arm does not do what was asked; Ctrl-C. A wrong option has 2.
 
-UNMET is the exit code of every answer with a warning, such as that of an unstable arm, and of
-errors that say what the arm cannot do.
+UNMET is the exit code of answers such as that of an unstable arm, and of errors that say what the
+arm cannot do. A warning that only qualifies numbers does not change it.
 """
 
 _OF_PYTHON: Final = re.compile(r", or, in Python, .*?(?=\.(\s|$))")  # no remedy of a command
@@ -47,21 +47,29 @@ def note(text: str) -> None:
     typer.echo(f"note: {text}", err=True)
 
 
-def answer(as_json: bool, numbers: Json, *parts: object, warnings: Iterable[str] = ()) -> int:
+def answer(
+    as_json: bool,
+    numbers: Json,
+    *parts: object,
+    warnings: Iterable[str] = (),
+    unmet: bool | None = None,
+) -> int:
     """Print an answer, its warnings first: ``parts`` as text, or ``numbers`` as strict JSON.
 
-    Return the exit code: UNMET if there are warnings, else 0.
+    Return the exit code: UNMET if the arm does not do what was asked, else 0. ``unmet`` says so; by
+    default every warning does.
     """
     warnings = tuple(warnings)
+    unmet = bool(warnings) if unmet is None else unmet
     if as_json:
-        print_json({"warnings": warnings, **numbers})
+        print_json({"warnings": warnings} | numbers | {"warnings": warnings})
     else:
         texts = (
             "\n".join(line for line in str(part).splitlines() if line not in warnings)
             for part in parts
         )
         typer.echo("\n".join([*warnings, "\n\n".join(texts)]))
-    return UNMET if warnings else 0
+    return UNMET if unmet else 0
 
 
 def print_json(numbers: Json) -> None:

@@ -82,12 +82,21 @@ def show_stiffness(
         output = numbers | rest.to_dict()
         with contextlib.suppress(cdsm.SingularStiffness):
             output["along_N_per_m"] = [rest.along(u) for u in "xyz"]
-        return answer(as_json, output, head, rest, *lines, warnings=rest.warnings)
+        return answer(
+            as_json,
+            output,
+            head,
+            rest,
+            *lines,
+            warnings=rest.warnings,
+            unmet=not rest.verdict.is_held,
+        )
     stuck, sticking = _sticking(K.distribution, axes)
     parts = [head, rest or K.distribution, K, *lines, *stuck, *sure]
     output = numbers | K.to_dict() | (rest.to_dict() if rest else {}) | sticking | uncertainty
-    warnings = K.warnings + (rest.warnings if rest else ())
-    return answer(as_json, output, *parts, warnings=warnings)
+    verdict = (rest or K).verdict
+    warnings = dict.fromkeys((*verdict.warnings, *K.warnings))
+    return answer(as_json, output, *parts, warnings=warnings, unmet=not verdict.is_held)
 
 
 def _balanced(
@@ -240,10 +249,12 @@ def weigh(
             moved = coordinates(without_rounding(1e3 * result.displacement))
             note += f"\nwith friction, at the full load: tip moved by {moved} mm"
     write_picture(figure, result.plot)
-    warnings = (*K.warnings, *(rest.warnings if rest else ()), *result.warnings)
+    verdict = (rest or K).verdict
+    warnings = (*verdict.warnings, *result.warnings)
+    unmet = bool(result.warnings) or not verdict.is_held
     output = numbers | ({"rest": rest} if rest else {}) | result.to_dict() | more
     parts = [head, *([rest, K] if rest else []), result, note]
-    return answer(as_json, output, *parts, warnings=dict.fromkeys(warnings))
+    return answer(as_json, output, *parts, warnings=dict.fromkeys(warnings), unmet=unmet)
 
 
 def _weight(arm: cdsm.Manipulator, load: str | None, mass: float | None) -> Array:

@@ -20,7 +20,7 @@ from cdsm.errors import CdsmError, FileError, unknown
 from cdsm.limits import UNCHECKED
 from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
-from cdsm.stiffness_matrix.prints import verdict
+from cdsm.stiffness_matrix.verdict import describe_buckling
 from cdsm.support.format import plural
 from cdsm.support.progress import progress_bar
 from cdsm.support.tables import csv_text, read_table
@@ -281,7 +281,7 @@ def _first_reason(problem: DesignProblem, row: Array) -> str:
                 pull = distribute_tension(pose, *bounds, load, worst_friction=worst)
                 K = stiffness(pose, pull)
                 if not K.is_stable:
-                    return f"posture {number}: {verdict(K)}"
+                    return f"posture {number}: {describe_buckling(K)}"
     except CdsmError as error:
         return f"posture {number}: {str(error).replace(UNCHECKED, '')}"
     return "its tensions are at the edge"

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from cdsm.friction.capstan import ChainProblem, assemble_segments, can_stick
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, checked_tension, stiffness
-from cdsm.stiffness_matrix.prints import verdict
+from cdsm.stiffness_matrix.verdict import describe_buckling
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import SMALLEST, Direction, unit_direction
@@ -212,7 +212,7 @@ class RestBand(Result):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that say where first order misleads; empty if there are none."""
-        warnings = [] if self.stiffness.is_stable else [verdict(self.stiffness)]
+        warnings = [] if self.stiffness.is_stable else [describe_buckling(self.stiffness)]
         if self.half_width > _WIDE * self.stiffness.posture.arm.length:
             warnings.append(
                 f"FAR TOO WIDE: ±{1e3 * self.half_width:.3g} mm is more than "

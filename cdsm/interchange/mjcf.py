@@ -28,10 +28,10 @@ from cdsm.interchange.mjcf_bodies import LEAST_INERTIA, add_bodies, couple
 from cdsm.interchange.mjcf_cables import add_path, pulley_remarks, row, side_sites
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.report.checks import TOLERANCE, balance_error
+from cdsm.report.checks import balance_error
 from cdsm.statics.modes import vibrations
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.stiffness_matrix.prints import verdict
+from cdsm.stiffness_matrix.verdict import TOLERANCE, describe_buckling
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.validation import RANGES, instance, one_of, scalar
@@ -197,7 +197,7 @@ def mujoco_model(
             frame.set("ctrl", row(controls))
 
     loaded = K if K is None or actuators != "tension" else _as_force_controlled(K)
-    unstable = None if loaded is None or loaded.is_stable else verdict(loaded)
+    unstable = None if loaded is None or loaded.is_stable else describe_buckling(loaded)
     remarks += [f"actuators  {actuators}: {_CONTROLS[actuators]}"]
     remarks += ["friction   of the cables in their holes is left out"]
     remarks += pulley_remarks(arm.at(q, check_limits=False), sides) if sides else []

@@ -7,7 +7,7 @@ import numpy as np
 from cdsm.errors import InvalidInput, solver_failed
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.stiffness_matrix.prints import verdict
+from cdsm.stiffness_matrix.verdict import describe_buckling
 from cdsm.support.validation import instance
 from cdsm.support.values import Array
 from cdsm.tension.solvers import minimise
@@ -50,7 +50,7 @@ def isotropy(stiffness: Stiffness) -> float:
     """
     K = instance("stiffness", stiffness, Stiffness)
     if K.margin < 0.0:
-        raise InvalidInput("stiffness", f"has no isotropy: {verdict(K)}.")
+        raise InvalidInput("stiffness", f"has no isotropy: {describe_buckling(K)}.")
     return float(principal_stiffness(K.compliance[:3, :3])["isotropy"])
 
 

@@ -10,6 +10,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm import readings
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.planning.tension_space import LARGEST_TENSION, form_by_tension, unstable
 from cdsm.posture import Posture
@@ -71,30 +72,40 @@ class StiffnessGradient(Result):
 
         Raises SingularStiffness if K_θ is singular, or the tip hardly moves in some direction.
         """
-        return frozen(self._through(np.eye(3), self.stiffness.cartesian))
+        slope = self.cable_stiffness
+        return frozen(
+            self._through(np.eye(3), self.stiffness.cartesian, self.stiffness.joint, slope)
+        )
 
     def along(self, direction: Direction) -> Array:
         """Return ∂s/∂F (C,) [1/m] of the stiffness s = ``K.along(u)``, u being ``direction``.
 
         ∂s/∂F = s² (K_θ⁻ᵀ J_vᵀ u)ᵀ ∂K_θ/∂F (K_θ⁻¹ J_vᵀ u), with the translational rows J_v of the
-        tip Jacobian. Raises InvalidInput if ``direction`` is not an axis or a nonzero (3,), and
-        SingularStiffness if K_θ is singular or the tip cannot move along u.
+        tip Jacobian. Of cables at 0 N, those that the force does not stretch are left out; the
+        gradient then holds while they stay at 0 N. Raises InvalidInput if ``direction`` is not an
+        axis or a nonzero (3,), and SingularStiffness if K_θ is singular or the tip cannot move
+        along u.
         """
         u = unit_direction("direction", direction)
-        self.stiffness.require_mobile(u)
-        return frozen(self._through(u[None], np.array([[self.stiffness.along(u)]]))[:, 0, 0])
+        K = self.stiffness
+        K.require_mobile(u)
+        along, motion = K.tip_response(u)
+        loose = K.loose(motion)
+        k = np.where(loose, K.cable_stiffness, 0.0)
+        taut = readings.without_cables(K.joint, K.posture.length_jacobian, k)
+        slope = np.where(loose, 0.0, self.cable_stiffness)
+        return frozen(self._through(u[None], np.array([[along]]), taut, slope)[:, 0, 0])
 
-    def _through(self, U: Array, X: Array) -> Array:
+    def _through(self, U: Array, X: Array, K: Array, slope: Array) -> Array:
         """Return Mᵀ ∂K_θ/∂F M (C, r, r), the derivative of X = (U C_vv Uᵀ)⁻¹ (r, r).
 
         M = K_θ⁻¹ (U J_v)ᵀ X is the joint motion per motion of the tip. The left one is of
         K_θᵀ, which differs if a moment acts on the tip.
         """
-        K = self.stiffness.joint
         rows = U @ self.stiffness.posture.jacobian[:3]
         left = np.linalg.solve(K.T, rows.T) @ X.T
         right = np.linalg.solve(K, rows.T) @ X
-        return form_by_tension(self.stiffness.posture, self.cable_stiffness, left, right)
+        return form_by_tension(self.stiffness.posture, slope, left, right)
 
     def __str__(self) -> str:
         arm = self.stiffness.posture.arm
@@ -237,7 +248,7 @@ def saturation(
     tried = [low, *np.geomspace(max(low, _SMALLEST * high), max(low, high), _SAMPLES)[1:].tolist()]
     for lower in tried:
         try:
-            if at(lower).is_stable:
+            if at(lower).margin_without_slack > 0.0:
                 stable.append(lower)
             elif stable:
                 limit = Status.UNSTABLE

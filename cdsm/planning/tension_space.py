@@ -17,13 +17,14 @@ from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize
 
+from cdsm import readings
 from cdsm.errors import ElasticityRangeError, InfeasibleTension, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.stiffness_matrix.prints import verdict
+from cdsm.stiffness_matrix.verdict import describe_buckling
 from cdsm.support.validation import SMALLEST, instance, wrench_vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import (
@@ -113,6 +114,10 @@ class TensionSpace:
         pose = self.pose
         (K, k) = self._joint_stiffness(F)
         slope = pose.arm.laws.stiffness_slope(F, k)
+        slack = readings.slack_cables(F, k)
+        if slack.any():
+            self._last = F, self._one_sided(K, k, slope, slack)
+            return self._last[1]
         values, vectors = np.linalg.eigh((K + K.T) / 2.0)
         rows = self.directions @ pose.jacobian[:3]
         K = K + 1e-21 * self._size * np.eye(len(K))  # which cannot be singular
@@ -123,9 +128,48 @@ class TensionSpace:
         self._last = F, StiffnessPoint((s, np.array(slopes)), (float(values[0]), softest))
         return self._last[1]
 
+    def _one_sided(
+        self, K: Array, k: Array, slope: Array, slack: NDArray[np.bool_]
+    ) -> StiffnessPoint:
+        """Evaluate K_θ (nv, nv) where some cables are at 0 N, and can only add tension.
+
+        ``along`` and its gradient are those with the cables that pull under the force, see
+        :func:`cdsm.readings.one_sided_along`; the smallest eigenvalue is that without any of them.
+        """
+        J = self.pose.length_jacobian
+        rows = self.directions @ self.pose.jacobian[:3]
+        K_0 = readings.without_cables(K, J, np.where(slack, k, 0.0))
+        values, vectors = np.linalg.eigh((K_0 + K_0.T) / 2.0)
+        v = vectors[:, :1]
+        softest = form_by_tension(self.pose, np.where(slack, 0.0, slope), v, v)[:, 0, 0]
+        _, motion, buckles = readings.one_sided_along(
+            K[None],
+            abs(K)[None],
+            J[None],
+            np.where(slack, k, 0.0)[None],
+            rows[None],
+            np.ones((1, len(rows)), dtype=np.bool_),
+        )
+        along = np.empty(len(rows))
+        slopes = np.empty((len(rows), slack.size))
+        for i, torque in enumerate(rows):
+            # where the arm is not stable, which the searches avoid, all cables count
+            loose = slack & (not buckles[0]) & readings.loose_cables(J, slack, motion[0, i])
+            taut = readings.without_cables(K, J, np.where(loose, k, 0.0))
+            right, left = (np.linalg.solve(A, torque[:, None]) for A in (taut, taut.T))
+            along[i] = 1.0 / (torque @ right[:, 0])
+            change = np.where(loose, 0.0, slope)
+            form = form_by_tension(self.pose, change, along[i] * left, along[i] * right)
+            slopes[i] = form[:, 0, 0]
+        return StiffnessPoint((along, slopes), (float(values[0]), softest))
+
     def reserve(self, F: Array) -> float:
         """Return λ/floor − 1 [-] of the smallest eigenvalue λ under F (C,); stable: 0 or more."""
-        K = self._joint_stiffness(np.clip(F, *self.bounds))[0]
+        F = np.clip(F, *self.bounds)
+        (K, k) = self._joint_stiffness(F)
+        slack = readings.slack_cables(F, k)
+        if slack.any():
+            K = readings.without_cables(K, self.pose.length_jacobian, np.where(slack, k, 0.0))
         return float(np.linalg.eigvalsh((K + K.T) / 2.0)[0]) / self.floor - 1.0
 
     def _joint_stiffness(self, F: Array) -> tuple[Array, Array]:
@@ -287,7 +331,8 @@ def form_by_tension(pose: Posture, slope: Array, left: Array, right: Array) -> A
 def unstable(K: Stiffness, tried: str, bounds: TensionLimits | None = None) -> SingularStiffness:
     """Return the error that none of the tensions ``tried`` make the arm stable; K is the best."""
     arm = K.posture.arm
-    problem = f"no {tried} make the arm stable. At best: {verdict(K)}. {too_few_cables(arm)}"
+    state = next(iter(K.verdict.warnings), describe_buckling(K))
+    problem = f"no {tried} make the arm stable. At best: {state}. {too_few_cables(arm)}"
     if all(cable.control == "force" for cable in arm.cables):
         problem += (
             "All motors control force, so that no cable resists by its elasticity: have some "

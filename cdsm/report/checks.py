@@ -20,11 +20,9 @@ from cdsm.definition import Term
 from cdsm.errors import CdsmError, listed
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.stiffness_matrix.report import Comparison, Verdict
+from cdsm.stiffness_matrix.verdict import TOLERANCE, imbalance_of
 from cdsm.support.values import Array
 from cdsm.terms import ConstantPull, Stretch, torque_size, without_cables
-
-TOLERANCE = 1e-6
-"""Largest residual of balance, KKT residual and error of a term, relative to what they are of."""
 
 _SMALL = 1e-3  # a term below this fraction of the whole is compared to this fraction of it
 _SAME = 1e-10  # K and the batch agree to this fraction of the largest entry of K_θ
@@ -35,11 +33,8 @@ _CHANGE = 4e-3  # largest change of a tension in a step, as a fraction of the te
 
 def balance_error(K: Stiffness) -> tuple[float, str, float]:
     """Return the largest residual of Eq. 13 [N m], its joint, and the residual per torque [-]."""
-    left = abs(K.residual * joint_unit(K))
-    worst = int(left.argmax())
-    most = float(left.max())
-    _, *others = _torque_sizes(K)  # the torque of the cables is in the list twice
-    return most, K.posture.arm.joint_names[worst], most / (sum(others) or 1.0)
+    joint, torque, relative = imbalance_of(K.posture, K.tension, K.wrench, K.residual)
+    return torque, K.posture.arm.joint_names[joint], relative
 
 
 def optimality(K: Stiffness) -> tuple[float | None, float | None]:
@@ -54,7 +49,9 @@ def optimality(K: Stiffness) -> tuple[float | None, float | None]:
     violation = max(0.0, float(np.maximum(below, above).max())) / size
     if not tension.least:
         return violation, None
-    free = null_space((K.posture.length_jacobian * joint_unit(K)).T).T  # where J_L λ has no part
+    free = null_space(
+        (K.posture.length_jacobian * K.posture.arm.levers).T
+    ).T  # where J_L λ has no part
     low = below >= -TOLERANCE * size
     high = above >= -TOLERANCE * size
     bounds = np.hstack([-free[:, low], free[:, high]])
@@ -66,7 +63,7 @@ def compared(K: Stiffness) -> tuple[Comparison, ...]:
     """Compare the terms of K_θ, K_θ, the torques of all terms, and the batch, in this order."""
     pose = K.posture
     arm = pose.arm
-    unit = joint_unit(K)
+    unit = K.posture.arm.levers
     terms = _terms(K)
     edge = listed([reason for c in _moved(K) for reason in _edges(K, c)], 3)
     followed = [term for term in terms if not edge or term.name != "passive"]
@@ -139,7 +136,7 @@ def _compare(
 def _batch_comparison(K: Stiffness, names: list[str], matrices: Array, most: float) -> Comparison:
     """Compare the terms of K and K_θ (n, nv, nv) with those of :func:`cdsm.evaluate`."""
     arm = K.posture.arm
-    unit = joint_unit(K)
+    unit = K.posture.arm.levers
     if lacking := without_kernel(arm):
         return _compare("batch", matrices, matrices, 0.0, most, f"no kernel for {listed(lacking)}")
     slack = (K.tension == 0.0) & (K.cable_stiffness == 0.0)
@@ -174,17 +171,12 @@ def _edges(K: Stiffness, c: int) -> list[str]:
 
 def _step(K: Stiffness) -> float:
     """Return the first step of the differences: small enough for all tensions."""
-    rise = K.cable_stiffness * abs(K.posture.length_jacobian * joint_unit(K)).max(axis=1)
+    rise = K.cable_stiffness * abs(K.posture.length_jacobian * K.posture.arm.levers).max(axis=1)
     taut = [c for c in _moved(K) if K.tension[c] * rise[c] > 0.0]
     return float(min([_STEP, *(_CHANGE * K.tension[taut] / rise[taut])]))
 
 
-def joint_unit(K: Stiffness) -> Array:
-    """Return the unit of each joint (nv,): 1 rad, or the arm's length [m] for a prismatic joint."""
-    return np.where(K.posture.arm.slides, K.posture.arm.length, 1.0)
-
-
 def _torque_sizes(K: Stiffness) -> Array:
     """Return the largest magnitude (n,) [N m] of the torque of each term."""
-    unit = joint_unit(K)
+    unit = K.posture.arm.levers
     return np.array([(torque_size(term, K.posture) * unit).max() for term in _terms(K)])

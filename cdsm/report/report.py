@@ -12,12 +12,12 @@ from cdsm.friction.stick import breakaway
 from cdsm.report import checks
 from cdsm.report.remedies import find_remedies
 from cdsm.stiffness_matrix import Report, Stiffness
-from cdsm.stiffness_matrix.prints import verdict
+from cdsm.stiffness_matrix.verdict import TOLERANCE, describe_buckling
 
 
 def report_on(K: Stiffness) -> Report:
     """Compute the report on a stiffness."""
-    scale = checks.joint_unit(K)
+    scale = K.posture.arm.levers
     condition = float(np.linalg.cond(K.joint * scale[:, None] * scale))
     balance = checks.balance_error(K)
     optimality = checks.optimality(K)
@@ -40,19 +40,19 @@ def _faults(report: Report) -> Iterator[str]:
     for reason in dict.fromkeys(check.reason for check in checks_of_k if check.reason):
         names = [check.name for check in checks_of_k if check.reason == reason]
         yield f"check not possible for {' and '.join(names)}: {reason}."
-    if report.imbalance > checks.TOLERANCE:
+    if report.imbalance > TOLERANCE:
         yield (
             "the tensions do not balance the arm: the residual is "
             f"{report.largest_residual:.3g} N m at {report.residual_joint}, "
             f"{report.imbalance:.1e} of the torques; distribute_tension finds tensions that do."
         )
     if not K.is_stable:
-        yield ". ".join([verdict(K), *map(str, report.remedies)])
+        yield ". ".join([describe_buckling(K), *map(str, report.remedies)])
     elif report.condition > 1e12:  # singular but for rounding
         yield f"the arm is about to buckle: K_θ has the condition number {report.condition:.2g}."
     violation = report.bound_violation or 0.0
     kkt = report.kkt_residual or 0.0
-    if max(violation, kkt) > checks.TOLERANCE:
+    if max(violation, kkt) > TOLERANCE:
         yield f"the tensions are not optimal: bounds violated by {violation:.1e}, KKT {kkt:.1e}."
 
 
@@ -74,7 +74,7 @@ def _notes(report: Report) -> Iterator[str]:
     if K.wrench[3:].any():
         yield "with a moment at the tip K_θ is not symmetric: its symmetric part decides stability."
     yield from _of_limits(K)
-    unit = checks.joint_unit(K)
+    unit = K.posture.arm.levers
     for matrix, full, what in (
         (pose.length_jacobian, arm.nv, "the cables give {} of {} joint torques."),
         (pose.jacobian[:3], 3, "the tip moves in {} of {} directions; in the others it is rigid."),

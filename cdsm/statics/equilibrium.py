@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,7 +16,16 @@ from cdsm.posture import Posture
 from cdsm.statics.events import Event, events_text
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import NEUTRAL, Balance, Point, settle
+from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.stiffness_matrix.verdict import (
+    Finding,
+    Verdict,
+    find_excess,
+    find_imbalance,
+    imbalance_of,
+    judge,
+)
 from cdsm.support.format import aligned, coordinates, plural, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import Direction, instance, unit_direction, wrench_vector
@@ -125,18 +135,41 @@ class Equilibrium(Result):
         resisted = sum(abs(motion @ matrix @ motion) for matrix in self.stiffness.terms.values())
         return bool(values[0] <= _NEUTRAL * resisted)
 
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether the arm rests here in a stable way, in one word, and what qualifies it."""
+        return judge(self._findings())
+
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence if the arm jumped on the way here, and one if it is neutral here."""
-        sentences = list[str]()
+        """Sentences on what qualifies this equilibrium; empty if it is simply stable.
+
+        They say that the arm jumped on the way here, is neutral, rests on a stop, is not in
+        balance, or that a cable is above its maximum or slack.
+        """
+        return self.verdict.warnings
+
+    def _findings(self) -> Iterator[Finding]:
+        """Yield why the arm is not simply stable here."""
+        arm = self.pose.arm
         if self.branch < 1.0:
-            part = f"at {100.0 * self.branch:.4g} % of load and pull its branch of equilibria ends"
-            sentences.append(f"JUMPED: {part}; from there the arm moves to this other one")
+            share = f"at {100.0 * self.branch:.4g} % of load and pull its branch of equilibria ends"
+            yield Status.MOVED, f"JUMPED: {share}; from there the arm moves to this other one"
         if not self.stable:
-            sentences.append("NEUTRAL: not every joint is brought back")
+            yield Status.NEUTRAL, "NEUTRAL: not every joint is brought back"
         elif self.neutral:
-            sentences.append("NEUTRAL: a motion of the joints meets hardly any resistance")
-        return tuple(sentences)
+            yield Status.NEUTRAL, "NEUTRAL: a motion of the joints meets hardly any resistance"
+        if len(self.at_limit) > _LISTED:
+            count = f"{len(self.at_limit)} of {plural(arm.nv, 'joint')}"
+            yield Status.AT_STOP, f"{count} rest on their stops"
+        elif self.at_limit:
+            rest = "rests on its stop" if len(self.at_limit) == 1 else "rest on their stops"
+            yield Status.AT_STOP, f"{listed(self.at_limit)} {rest}"
+        imbalance = imbalance_of(self.pose, self.tension, self.wrench, self.residual)
+        yield from find_imbalance(arm, imbalance, self.residual)
+        yield from find_excess(arm, self.tension)
+        if self.slack:
+            yield Status.SLACK, f"slack: {listed(self.slack)}"
 
     @quantity("1")
     def slack(self) -> tuple[str, ...]:
@@ -275,8 +308,9 @@ class Equilibrium(Result):
             if self.motors == "locked"
             else "motors hold the tensions: cables add no stiffness of their own"
         )
-        residual = f"{abs(self.residual).max():.1e} {arm.torque_unit()}"
-        state = "; ".join(self.warnings) or "stable"
+        worst = int(abs(self.residual * arm.levers).argmax())
+        residual = f"{abs(self.residual[worst]):.1e} {arm.torque_unit(worst)}"
+        state = "; ".join(self.warnings) or self.verdict.word
         return "\n".join([*lines, f"{state}, residual {residual}"])
 
 

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdsm.errors import SingularStiffness
-from cdsm.support.format import MODEL, coordinates, key, span
+from cdsm.quantities import display_for
+from cdsm.stiffness_matrix.verdict import least_joint_stiffness
+from cdsm.support.format import MODEL, coordinates, key, largest_finite, span
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
@@ -30,7 +32,9 @@ def readings(K: Stiffness) -> dict[str, object]:
         "cartesian_N_per_m": _existing(lambda: K.cartesian),
         "pseudoinverse_N_per_m": _existing(K.pseudoinverse),
         "compliance": _existing(lambda: K.compliance),
-        "stable": K.is_stable,
+        "stable": K.verdict.is_held,
+        "verdict": K.verdict.status,
+        "warnings": K.warnings,
     }
 
 
@@ -47,7 +51,7 @@ def _existing(read: Callable[[], object]) -> object:
 
 
 def table(K: Stiffness) -> list[str]:
-    """Return the lines of the printed table: readings [N/mm] along x, y and z."""
+    """Return the lines of the printed table: readings along x, y and z, of the softer sides."""
     axes = np.eye(3)
     sprung = K.posture.arm.has_springs
     cables = ("passive", "active")
@@ -56,8 +60,9 @@ def table(K: Stiffness) -> list[str]:
     rows = np.full((3 + len(parts), 3), math.nan)
     for i, u in enumerate(axes):
         with suppress(SingularStiffness):
-            rows[0, i] = K.along(u)
-            shares = K.shares(u)
+            softer = u if K.along(u) <= K.along(-u) else -u
+            rows[0, i] = K.along(softer)
+            shares = K.shares(softer)
             sums = shares.passive.sum(), shares.active.sum(), *shares.others.values()
             rows[1:-2, i] = sums
     mobile = np.isfinite(rows[0])
@@ -65,9 +70,11 @@ def table(K: Stiffness) -> list[str]:
         if mobile.any():
             rows[-2, mobile] = K.cartesian_in(axes[mobile]).diagonal()
         rows[-1] = K.pseudoinverse().diagonal()
-    cells = [["-" if math.isnan(k) else f"{k:.4g}" for k in row] for row in rows / 1e3]
-    names = ["along", *(f"  of it {part}" for part in parts), "cartesian, diagonal"]
-    names = ["stiffness [N/mm]", *names, "pseudoinverse, diagonal"]
+    unit, size = display_for("N/m", largest_finite(rows[0]))
+    cells = [["-" if math.isnan(k) else f"{k:.4g}" for k in row] for row in rows / size]
+    along = "along, softer side" if K.slack else "along"
+    names = [along, *(f"  of it {part}" for part in parts), "cartesian, diagonal"]
+    names = [f"stiffness [{unit}]", *names, "pseudoinverse, diagonal"]
     lines = zip(names, ["xyz", *cells], strict=True)
     return [f"{name:<24}{''.join(f'{cell:>12}' for cell in row)}" for name, row in lines]
 
@@ -82,9 +89,8 @@ def notes(K: Stiffness) -> tuple[str, ...]:
         if _existing(lambda: K.compliance) is not None:
             fixed = f"inf, -: the tip cannot move along {axis_of(error.direction)}"
             missing = [f"{fixed}; cartesian: in the plane of other axes"]
-    state = "stable" if K.is_stable else "UNSTABLE"
-    unit = K.posture.arm.stiffness_unit()
-    least = f"{state}, smallest joint stiffness {K.margin:.4g} {unit} ({model_of(K)})"
+    stiffness = f"smallest joint stiffness {least_joint_stiffness(K)}"
+    least = f"{K.verdict.word}, {stiffness} ({model_of(K)})"
     return (*missing, *K.posture.remarks, least)
 
 
@@ -110,11 +116,3 @@ def frictionless_model(arm: Manipulator) -> str:
 def axis_of(u: Array) -> str:
     """Write a direction (3,) as text; of u and −u, the one whose largest entry is positive."""
     return coordinates(np.round(u * np.sign(u[abs(u).argmax()]), 9), "z.3g")
-
-
-def verdict(K: Stiffness) -> str:
-    """Return a sentence about an unstable arm: which joint buckles most, and the margin."""
-    arm = K.posture.arm
-    worst = int(abs(K.critical_direction).argmax())
-    margin = f"the smallest eigenvalue of K_θ is {K.margin:.4g} {arm.stiffness_unit()}"
-    return f"UNSTABLE: the arm buckles, {arm.joint_names[worst]} most; {margin}"

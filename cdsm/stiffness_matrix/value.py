@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm import readings
-from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints
-from cdsm.stiffness_matrix.prints import verdict
 from cdsm.stiffness_matrix.report import Report
 from cdsm.stiffness_matrix.shares import Shares
+from cdsm.stiffness_matrix.verdict import Verdict, describe_buckling, judge_stiffness
 from cdsm.support.format import coordinates, merged, prepare_json
-from cdsm.support.result import Result, tabulated, unit, unit_of
+from cdsm.support.result import Result, quantity, tabulated, unit, unit_of
 from cdsm.support.validation import Direction, one_of, unit_direction, unit_directions
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
@@ -146,6 +146,43 @@ class Stiffness(Result):
         """Whether the symmetric part of K_θ is positive definite."""
         return self.margin > 0.0
 
+    @quantity("1")
+    def slack(self) -> tuple[str, ...]:
+        """Names of the cables at 0 N that have a stiffness: they resist only what stretches them.
+
+        0 N is a tension below 1e-9 of the largest one. :meth:`along` and :meth:`shares` let these
+        cables pull or hang loose; K_θ and all that follows from it count them as taut.
+        """
+        return tuple(self.posture.arm.cables.names[c] for c in np.flatnonzero(self._slack))
+
+    @cached_property
+    def without_slack(self) -> Array:
+        """K_θ without the stiffness of the cables at 0 N (nv, nv) [N m/rad]."""
+        k = np.where(self._slack, self.cable_stiffness, 0.0)
+        return frozen(readings.without_cables(self.joint, self.posture.length_jacobian, k))
+
+    @property
+    def margin_without_slack(self) -> float:
+        """Smallest eigenvalue of the symmetric part of :attr:`without_slack` [N m/rad].
+
+        If it is negative, the arm is unstable to one side: it can leave without stretching them.
+        """
+        return float(readings.margin(self.without_slack))
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether the arm is stable and in balance, in one word, and what qualifies it."""
+        return judge_stiffness(self)
+
+    def loose(self, motion: Array) -> NDArray[np.bool_]:
+        """Return which cables at 0 N a motion (nv,) of the joints does not stretch (C,)."""
+        return readings.loose_cables(self.posture.length_jacobian, self._slack, motion)
+
+    @cached_property
+    def _slack(self) -> NDArray[np.bool_]:
+        """Which cables are at 0 N and have a stiffness (C,)."""
+        return readings.slack_cables(self.tension, self.cable_stiffness)
+
     @cached_property
     def compliance(self) -> Array:
         """Compliance C = J_X K_θ⁻¹ J_Xᵀ (6, 6): tip motion per wrench at the tip.
@@ -177,12 +214,19 @@ class Stiffness(Result):
         return self._cartesian_in(U)
 
     def along(self, direction: Direction) -> float:
-        """Compute 1/(uᵀ C_vv u) [N/m], the tangent stiffness that a tip weight measures (Eq. 20).
+        """Compute the tangent stiffness [N/m] that a small force along +u measures (Eq. 20).
+
+        It is 1/(uᵀ C_vv u). Cables at 0 N (:attr:`slack`) only add tension: the stiffness is then
+        1/(τᵀ x), in which the joint motion x has the least energy ½ xᵀ K_0 x + ½ Σ k_c max(J_c x,
+        0)² − τᵀ x under the torque τ = J_vᵀ u; K_0 is K_θ without these cables. It differs for u
+        and −u. With a moment in W, x solves the equilibrium instead, which has no potential. With
+        friction (:attr:`friction`), cables at 0 N count as taut.
 
         u is an axis such as ``"z"`` or ``"-z"``, or (3,) in base axes, any length, else
         InvalidInput. A weight that is not small beside the tensions measures a secant:
         :func:`~cdsm.weight_test`. The stiffness is inf if the tip cannot move along u, and may be
-        negative if the arm is unstable.
+        negative if the arm is unstable. SingularStiffness if K_θ is singular, or if the arm is
+        unstable to one side: K_0 is not positive definite.
         """
         return self.tip_response(unit_direction("direction", direction))[0]
 
@@ -236,16 +280,42 @@ class Stiffness(Result):
             joints per force (n,) [rad/N].
 
         Raises:
-            SingularStiffness: As :meth:`joint_compliance`.
+            SingularStiffness: As :meth:`joint_compliance`, or the arm is unstable to one side.
         """
         J_v = self.posture.jacobian[:3]
         torque = (u @ J_v)[joints]
         moves = readings.moves_tip(torque, J_v)
         if not moves:
             return math.inf, np.zeros_like(torque)
+        if self.slack and self.friction == "frictionless":
+            return self._one_sided_response(torque, joints)
         inverse = self._inverse if isinstance(joints, slice) else self.joint_compliance(joints)
         stiffness, motion = readings.along(inverse, torque[None], moves)
         return float(stiffness[0]), motion[0]
+
+    def _one_sided_response(self, torque: Array, joints: Joints) -> tuple[float, Array]:
+        """Compute what :meth:`tip_response` does, of cables at 0 N that can only add tension."""
+        k = np.where(self._slack, self.cable_stiffness, 0.0)
+        along, motion, buckles = readings.one_sided_along(
+            self.joint[joints][None, :, joints],
+            self.magnitudes[joints][None, :, joints],
+            self.posture.length_jacobian[None, :, joints],
+            k[None],
+            torque[None, None],
+            np.ones((1, 1), dtype=np.bool_),
+        )
+        if buckles[0]:
+            K_0 = self.without_slack[joints][:, joints]
+            least = np.zeros(len(self.joint))
+            least[joints] = np.linalg.eigh((K_0 + K_0.T) / 2.0)[1][:, 0]
+            worst = self.posture.arm.joint_names[int(abs(least).argmax())]
+            problem = f"without {listed(self.slack)} at 0 N, which only pull, nothing holds the arm"
+            raise SingularStiffness(
+                f"unstable to one side: {problem}, {worst} least. Raise the lower bound of their "
+                "tensions, or change the posture.",
+                frozen(least),
+            )
+        return float(along[0, 0]), motion[0, 0]
 
     def _cartesian_in(self, U: Array | None) -> Array:
         """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m] of orthonormal directions U (n, 3), or of all."""
@@ -286,7 +356,8 @@ class Stiffness(Result):
         along, moved = self.tip_response(u)
         motion = moved * along
         if self.segment_tension is None or self.tension_gradient is None:
-            passive = self.cable_stiffness * (self.posture.length_jacobian @ motion) ** 2
+            k = np.where(self.loose(motion), 0.0, self.cable_stiffness)
+            passive = k * (self.posture.length_jacobian @ motion) ** 2
             active = self.tension * (self.posture.length_hessian @ motion @ motion)
         else:
             segments = self.posture.segments
@@ -304,18 +375,18 @@ class Stiffness(Result):
                 if name not in CABLE_TERMS
             },
             model=prints.model_of(self),
-            warnings=() if self.is_stable else (verdict(self),),
+            warnings=() if self.is_stable else (describe_buckling(self),),
         )
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Lines that say that the arm is UNSTABLE, or a cable about to leave a pulley; else empty.
+        """Sentences on what makes the numbers doubtful; empty for a stable arm in balance.
 
-        ``report().remedies`` are changes that would hold an unstable arm.
+        They say that the arm is UNSTABLE, or so without cables at 0 N; that its tensions do not
+        balance it; that a cable is above its maximum, or about to leave a pulley; or that cables at
+        0 N count as taut. ``report().remedies`` are changes that would hold an unstable arm.
         """
-        unstable = () if self.is_stable else (verdict(self),)
-        wrapping = self.posture.wrapping
-        return (*unstable, *wrapping.remarks) if wrapping else unstable
+        return self.verdict.warnings
 
     def report(self) -> Report:
         """Check this frictionless stiffness: is it right, balanced, stable, and how to read it."""

@@ -53,6 +53,11 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     ]
 
 
+def largest_finite(values: Array) -> float:
+    """Return the largest magnitude among the finite values; 0 if there are none."""
+    return float(abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
 _ROUNDING = 1e-9  # a number of a table below this fraction of the largest is printed as zero
 
 

@@ -17,7 +17,7 @@ from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.status import Status
-from cdsm.stiffness_matrix.prints import verdict
+from cdsm.stiffness_matrix.verdict import describe_buckling
 from cdsm.support.format import span, with_uncertainty
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import Direction, fraction, instance
@@ -141,7 +141,7 @@ class Uncertainty(Result, Plotted):
         """Warning that the arm is UNSTABLE, if the measurand is a stiffness."""
         K = self.measurand.stiffness
         has_stiffness = self.measurand.quantity.needs in ("stiffness", "stable arm")
-        return (verdict(K),) if has_stiffness and not K.is_stable else ()
+        return (describe_buckling(K),) if has_stiffness and not K.is_stable else ()
 
     @property
     def _nonlinear(self) -> tuple[str, ...]:
