@@ -56,6 +56,7 @@ class Quantity(NamedTuple):
     dims: tuple[str, ...] = ()  # after those of the postures
     best: Literal["most", "least"] | None = None  # which end a design prefers; None: neither
     outputs: frozenset[Output] = frozenset()  # what gives it
+    is_flag: bool = False  # whether entries are true or false, and false where none exists
     is_slow: bool = False  # whether it takes milliseconds at each posture
     shown: tuple[str, float] | None = None  # unit for people and its size, if not that of DISPLAY
     reads: tuple[str, ...] = ()  # quantities from which it is computed
@@ -174,6 +175,9 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "along": Quantity(
         "stiffness", "stiffness along a direction", "1/(uᵀ C_vv u) (Eq. 20)", "N/m",
         ("direction",), best="most", outputs=_ALL),
+    "slack": Quantity(
+        "stiffness", "whether a cable is at 0 N", "along is then one-sided, all else two-sided",
+        outputs=_ARRAYS, is_flag=True),
     "compliance": Quantity(
         "stiffness", "compliance", "C = J_X K_θ⁻¹ J_Xᵀ, tip motion per wrench", "1", MOTION_DIMS,
         outputs=_ARRAYS),

@@ -52,7 +52,8 @@ class Status(IntEnum):
     """The tip can hardly move in some direction (SingularStiffness): cartesian and pseudoinverse do
     not exist, all other quantities exist."""
     UNSTABLE = 8, "the arm buckles"
-    """The arm buckles (margin ≤ 0). In sweeps, softest, stiffest and isotropy do not exist; if the
+    """The arm buckles (margin ≤ 0), or does so without the cables at 0 N, which only pull; then
+    along does not exist. In sweeps, softest, stiffest and isotropy do not exist; if the
     tip is also IMMOBILE, cartesian and pseudoinverse do not exist."""
     PENDING = 9, "not computed yet"
     """Only in stores of sweeps: not computed yet, no quantity exists."""

@@ -7,11 +7,12 @@ Kernels take blocks of W postures side by side, (B, …, W). All else takes one 
 from __future__ import annotations
 
 from types import ModuleType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm import readings
 from cdsm.batch.quantities import READINGS, TERMS, Codes, read
 from cdsm.batch.rows import BodyArrays, PoseArrays, Rows, one_by_one, side_by_side, tables_of
 from cdsm.quantities import QUANTITIES
@@ -67,7 +68,7 @@ class Chunk:
         lost = rows.status
         self.status: Codes = np.zeros(len(self._q), np.uint8) if lost is None else lost[part].copy()
 
-    def quantities(self) -> dict[str, Array]:
+    def quantities(self) -> dict[str, NDArray[Any]]:
         """Compute the quantities (n, …); NaN where one does not exist, as the status says."""
         rows = self._rows
         if rows.check_limits:
@@ -78,7 +79,7 @@ class Chunk:
         at = self._by_independent_joints(by_all_joints)
         short = self._one_by_one(at.shortest) < SHORTEST_SEGMENT
         self._fail(short, Status.COINCIDENT_SITES)
-        values = self._of_posture(at)
+        values: dict[str, NDArray[Any]] = {**self._of_posture(at)}
         if not self._names <= values.keys():
             F = self._tensions(at)
             tension = self._one_by_one(F)
@@ -89,6 +90,8 @@ class Chunk:
                 values["residual"] = self._one_by_one(balance - at.torque)
             k = side_by_side(k, self._width)
             values |= self._of_stiffness(by_all_joints, at, F, k, W)
+            if not self._names.isdisjoint(("along", "slack")):
+                self._allow_slack(values, by_all_joints, at, F, k, W)
         return {name: self._where_it_exists(name, values[name]) for name in self._names}
 
     def _fail(self, failed: NDArray[np.bool_], status: Status) -> None:
@@ -201,6 +204,38 @@ class Chunk:
             self._read(values, wanted, fine, terms[fine], values["joint"][fine], at)
         return values
 
+    def _allow_slack(
+        self,
+        values: dict[str, NDArray[Any]],
+        by_all_joints: PoseArrays,
+        at: PoseArrays,
+        F: Array,
+        k: Array,
+        W: Array,
+    ) -> None:
+        """Set ``slack``, and ``along`` of rows with cables at 0 N, which can only add tension."""
+        cable_stiffness = self._one_by_one(k)
+        slack = readings.slack_cables(self._one_by_one(F), cable_stiffness)
+        any_slack = np.asarray(slack.any(axis=1))
+        values["slack"] = any_slack
+        exists = np.isin(self.status, (Status.OK, Status.IMMOBILE))
+        rows = np.flatnonzero(any_slack & exists)
+        if "along" not in self._names or not rows.size:
+            return
+        terms = self._terms(by_all_joints, F, k, W, rows)
+        J_v = self._tip_jacobian(at)[rows, :3]
+        torque = self._rows.directions @ J_v
+        along, _, buckles = readings.one_sided_along(
+            terms.sum(axis=1),
+            abs(terms).sum(axis=1),
+            self._one_by_one(at.jacobian)[rows],
+            np.where(slack, cable_stiffness, 0.0)[rows],
+            torque,
+            readings.moves_tip(torque, J_v),
+        )
+        values["along"][rows] = along
+        self.status[rows[buckles]] = Status.UNSTABLE
+
     def _is_eliminated_in_place(self, wanted: set[str]) -> bool:
         """Whether the kernel ``fill_along`` has all that is wanted of K_θ."""
         return (
@@ -271,17 +306,19 @@ class Chunk:
         """Add to ``values`` what is read off K_θ of some rows, and set their status."""
         magnitudes = abs(terms).sum(axis=1)
         J = self._tip_jacobian(at)[rows]
-        readings, self.status[rows] = read(names, K, magnitudes, J, self._rows.directions)
-        for name, value in readings.items():
+        numbers, self.status[rows] = read(names, K, magnitudes, J, self._rows.directions)
+        for name, value in numbers.items():
             if name not in values:
                 values[name] = np.full((len(self._q), *value.shape[1:]), np.nan)
             values[name][rows] = value
 
-    def _where_it_exists(self, name: str, value: Array) -> Array:
-        """Put NaN where the quantity does not exist."""
+    def _where_it_exists(self, name: str, value: NDArray[Any]) -> NDArray[Any]:
+        """Put NaN, or False, where the quantity does not exist."""
         if not self.status.any():
             return value
         lost = np.isin(self.status, _WITHOUT[QUANTITIES[name].needs])
+        if QUANTITIES[name].is_flag:
+            return np.asarray(value & ~lost)
         return np.where(lost.reshape(-1, *[1] * (value.ndim - 1)), np.nan, value)
 
     # --- between rows and blocks -----------------------------------------------------------------

@@ -134,7 +134,7 @@ def evaluate(
             ``"cable_lengths"``, ``"length_jacobian"``, ``"gravity_torque"``. Of a stiffness:
             ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"springs"``, ``"joint"``,
             ``"cable_stiffness"``, ``"residual"``, ``"margin"``, ``"compliance"``, ``"cartesian"``,
-            ``"along"``, ``"pseudoinverse"``. The tensions: ``"tension"``.
+            ``"along"``, ``"slack"`` (a boolean), ``"pseudoinverse"``. The tensions: ``"tension"``.
         direction: u of ``"along"``: an axis such as ``"z"``, or (3,), any length. For several
             directions (D, 3) the output is (B, D).
         minimum: Lower bounds [N] of the tensions, as for :func:`distribute_tensions`; tensions are

@@ -15,14 +15,16 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cdsm.batch.chunk import Chunk, Scratch
 from cdsm.batch.quantities import Codes, shapes_of
 from cdsm.batch.rows import ArmTables, Rows, tables_of
 from cdsm.batch.wrapped_rows import solve_wrapped
-from cdsm.support.values import Array
+from cdsm.quantities import QUANTITIES
 
 # numbers of the poses of a chunk, compiled and by numpy, where a chunk has one block; 64 postures
 # side by side are fastest, or 32 of long arms
@@ -151,7 +153,7 @@ def _source() -> Path:
     return Path(__file__).with_name("kernels.py")
 
 
-def solve_rows(rows: Rows, threads: int = 1) -> tuple[dict[str, Array], Codes]:
+def solve_rows(rows: Rows, threads: int = 1) -> tuple[dict[str, NDArray[Any]], Codes]:
     """Compute the quantities of all rows by name (N, …), and the status (N,) of each row."""
     if rows.arm.wraps is not None and rows.touches is None:
         return solve_wrapped(rows, threads, solve_rows)
@@ -164,7 +166,10 @@ def solve_rows(rows: Rows, threads: int = 1) -> tuple[dict[str, Array], Codes]:
         size = width * max(1, _CACHE // (table.size * width))
     parts = [slice(first, first + size) for first in range(0, count, size)]
     shapes = shapes_of(rows.arm.nv, len(rows.arm.cables), len(rows.directions))
-    values = {name: np.empty((count, *shapes[name])) for name in rows.names}
+    values: dict[str, NDArray[Any]] = {
+        name: np.empty((count, *shapes[name]), np.bool_ if QUANTITIES[name].is_flag else np.float64)
+        for name in rows.names
+    }
     status = np.zeros(count, dtype=np.uint8)
     of_thread = threading.local()
 

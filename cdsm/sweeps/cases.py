@@ -31,7 +31,7 @@ from cdsm.tension import checked_bounds, friction_exponents
 CASES: Final = ("wrench", "minimum")
 """Dimensions of the cases; each exists only if several values of the argument are given."""
 
-DEFAULT: Final = ("tip_position", "along", "margin", "softest", "stiffest", "isotropy")
+DEFAULT: Final = ("tip_position", "along", "slack", "margin", "softest", "stiffest", "isotropy")
 """Default outputs, which the maps need."""
 
 
@@ -110,7 +110,7 @@ class Cases:
             if needs == "posture":
                 rows[name] = rows[name][::cases]
             else:
-                rows[name][~exists[needs]] = np.nan
+                rows[name][~exists[needs]] = False if QUANTITIES[name].is_flag else np.nan
         if "compliance" in batch:
             principal = principal_stiffness(batch["compliance"][stable, :3, :3])
             for name in principal.keys() & rows.keys():

@@ -65,7 +65,7 @@ class Labelled(Cases):
             input_core_dims=[["joint"]],
             output_core_dims=dims,
             dask="parallelized",
-            output_dtypes=[np.int8 if name == "status" else np.float64 for name in names],
+            output_dtypes=[_dtype(name) for name in names],
             dask_gufunc_kwargs={"output_sizes": {d: self.sizes[d] for core in dims for d in core}},
         )
         dataset = xarray.Dataset(dict(zip(names, variables, strict=True)), attrs=self._about())
@@ -155,6 +155,13 @@ def _dims(name: str) -> list[str]:
         return [*CASES]
     quantity = QUANTITIES[name]
     return [*(() if quantity.needs == "posture" else CASES), *quantity.dims]
+
+
+def _dtype(name: str) -> type[np.generic]:
+    """Return the type of the entries of an output or of ``status``."""
+    if name == "status":
+        return np.int8
+    return np.bool_ if QUANTITIES[name].is_flag else np.float64
 
 
 def _labels(dim: str, names: Sequence[object]) -> tuple[str, NDArray[Any], dict[str, str]]:
