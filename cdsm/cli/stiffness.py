@@ -75,7 +75,7 @@ def show_stiffness(
         report = (rest or K).report()
         about = f"{arm}\n{head}\ncdsm {cdsm.__version__}"
         write(out, lambda file: write_text(file, report.to_html(about)))
-        failed = () if report.passed else ("FAIL: the report says why.",)
+        failed = () if report.passed else (f"{report.outcome}: the report says why.",)
         output = numbers | report.to_dict() | uncertainty
         return answer(as_json, output, head, report, *lines, *sure, warnings=failed)
     if rest and rest.at_limit:  # K knows no stops

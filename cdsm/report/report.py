@@ -11,6 +11,7 @@ from cdsm.errors import CdsmError, SingularStiffness, listed
 from cdsm.friction.stick import breakaway
 from cdsm.report import checks
 from cdsm.report.remedies import find_remedies
+from cdsm.status import Status
 from cdsm.stiffness_matrix import Report, Stiffness
 from cdsm.stiffness_matrix.verdict import TOLERANCE, describe_buckling
 
@@ -23,7 +24,12 @@ def report_on(K: Stiffness) -> Report:
     optimality = checks.optimality(K)
     remedies = () if K.is_stable else tuple(find_remedies(K))
     measured = Report(K, checks.compared(K), *balance, *optimality, condition, remedies)
-    return replace(measured, faults=tuple(_faults(measured)), notes=tuple(_notes(measured)))
+    return replace(
+        measured,
+        faults=tuple(_faults(measured)),
+        unchecked=tuple(_unchecked(measured)),
+        notes=tuple(_notes(measured)),
+    )
 
 
 def _faults(report: Report) -> Iterator[str]:
@@ -36,10 +42,6 @@ def _faults(report: Report) -> Iterator[str]:
                 f"largest entry is {comparison.largest:.4g} {comparison.unit}. Do not use this "
                 "stiffness."
             )
-    checks_of_k = [check for check in report.comparisons if check.name != "batch"]
-    for reason in dict.fromkeys(check.reason for check in checks_of_k if check.reason):
-        names = [check.name for check in checks_of_k if check.reason == reason]
-        yield f"check not possible for {' and '.join(names)}: {reason}."
     if report.imbalance > TOLERANCE:
         yield (
             "the tensions do not balance the arm: the residual is "
@@ -50,10 +52,21 @@ def _faults(report: Report) -> Iterator[str]:
         yield ". ".join([describe_buckling(K), *map(str, report.remedies)])
     elif report.condition > 1e12:  # singular but for rounding
         yield f"the arm is about to buckle: K_θ has the condition number {report.condition:.2g}."
+    for status, sentence in K.verdict.findings:
+        if status in (Status.UNSTABLE_TO_ONE_SIDE, Status.ABOVE_MAXIMUM):
+            yield f"{sentence}."
     violation = report.bound_violation or 0.0
     kkt = report.kkt_residual or 0.0
     if max(violation, kkt) > TOLERANCE:
         yield f"the tensions are not optimal: bounds violated by {violation:.1e}, KKT {kkt:.1e}."
+
+
+def _unchecked(report: Report) -> Iterator[str]:
+    """Yield what finite differences cannot decide, and why."""
+    checks_of_k = [check for check in report.comparisons if check.name != "batch"]
+    for reason in dict.fromkeys(check.reason for check in checks_of_k if check.reason):
+        names = [check.name for check in checks_of_k if check.reason == reason]
+        yield f"check not possible for {' and '.join(names)}: {reason}."
 
 
 def _notes(report: Report) -> Iterator[str]:

@@ -18,6 +18,14 @@ if TYPE_CHECKING:
 
     from cdsm.stiffness_matrix.value import Stiffness
 
+Outcome = Literal["PASS", "NOT CHECKED", "FAIL"]
+
+_OUTCOMES: Final[dict[Outcome, str]] = {
+    "PASS": "agrees with finite differences, tensions balance the arm, arm is stable.",
+    "NOT CHECKED": "no fault was found, but not all could be checked.",
+    "FAIL": "do not use this stiffness as it is.",
+}
+
 Verdict = Literal["agrees", "DIFFERS", "not possible"]
 
 
@@ -90,6 +98,7 @@ class Report(Result):
         remedies: Changes that would make an unstable arm stable, each alone; empty for a stable
             arm, and if friction makes it unstable.
         faults: Reasons not to use the stiffness, one text each; empty if there are none.
+        unchecked: What could not be checked and why, one text each.
         notes: Notes on how to read the stiffness, one text each, e.g. that a cable is slack.
     """
 
@@ -103,16 +112,25 @@ class Report(Result):
     condition: float = field(metadata=unit("1"))
     remedies: tuple[Remedy, ...] = ()
     faults: tuple[str, ...] = ()
+    unchecked: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
+    def outcome(self) -> Outcome:
+        """``"FAIL"`` if there are faults, else ``"NOT CHECKED"`` if a check was not possible."""
+        if self.faults:
+            return "FAIL"
+        return "NOT CHECKED" if self.unchecked else "PASS"
+
+    @property
     def passed(self) -> bool:
-        """Whether there are no faults: all comparisons agree, the arm is in balance and stable."""
-        return not self.faults
+        """Whether all could be checked, agrees, and the arm is in balance and stable."""
+        return self.outcome == "PASS"
 
     def to_dict(self) -> dict[str, object]:
         """Return the report and :meth:`Stiffness.to_dict` in SI for JSON, units in the keys."""
-        verdict = {"passed": self.passed, "faults": self.faults, "notes": self.notes}
+        verdict = {"outcome": self.outcome, "passed": self.passed, "faults": self.faults}
+        verdict |= {"unchecked": self.unchecked, "notes": self.notes}
         comparisons = {"comparisons": [asdict(comparison) for comparison in self.comparisons]}
         remedies = {"remedies": {remedy.change: remedy.factor for remedy in self.remedies}}
         parts = prepare_json(verdict | comparisons | remedies), super().to_dict()
@@ -124,7 +142,7 @@ class Report(Result):
 
     def __repr__(self) -> str:
         name = self.stiffness.posture.arm.name
-        return f"<Report on the stiffness of {name}: {'PASS' if self.passed else 'FAIL'}>"
+        return f"<Report on the stiffness of {name}: {self.outcome}>"
 
     def __str__(self) -> str:
         return "\n".join(map(str.rstrip, _printed(self).export_text().splitlines()))
@@ -141,11 +159,11 @@ def _printed(report: Report, about: str = "") -> Console:
     console.print(f"Stiffness check: {report.stiffness.posture.arm.name}", style="bold")
     if about:
         console.print(about)
-    good = "PASS: agrees with finite differences, tensions balance the arm, arm is stable."
-    bad = "FAIL: do not use this stiffness as it is."
-    console.print(good if report.passed else bad, style="bold")
+    console.print(f"{report.outcome}: {_OUTCOMES[report.outcome]}", style="bold")
     for fault in report.faults:
         console.print(f"! {fault}", style="red")
+    for reason in report.unchecked:
+        console.print(f"? {reason}", style="dark_orange")
     for note in report.notes:
         console.print(f"- {note}")
     console.print(f"\n{report.stiffness}\n")

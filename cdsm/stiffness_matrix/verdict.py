@@ -50,12 +50,21 @@ class Verdict:
     """What may be said of an arm with its tensions and load.
 
     Attributes:
-        status: The most severe cause why the arm is not simply stable; OK if there is none.
-        warnings: A sentence for each cause, the most severe first.
+        findings: The causes why the arm is not simply stable with a sentence each, the most severe
+            first.
     """
 
-    status: Status
-    warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def status(self) -> Status:
+        """The most severe cause why the arm is not simply stable; OK if there is none."""
+        return self.findings[0][0] if self.findings else Status.OK
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The sentences of all findings."""
+        return tuple(sentence for _, sentence in self.findings)
 
     @property
     def heading(self) -> str:
@@ -76,11 +85,7 @@ class Verdict:
 
     def with_findings(self, findings: Iterable[Finding]) -> Verdict:
         """Return the verdict that knows more, such as that the arm buckled on the way."""
-        further = _ranked(findings)
-        statuses = [self.status, *(status for status, _ in further)]
-        worst = min(statuses, key=_SEVERITY.index)
-        sentences = [sentence for _, sentence in further]
-        return Verdict(worst, tuple(dict.fromkeys([*sentences, *self.warnings])))
+        return judge([*findings, *self.findings])
 
 
 class Imbalance(NamedTuple):
@@ -93,7 +98,7 @@ class Imbalance(NamedTuple):
 
 def judge(findings: Iterable[Finding]) -> Verdict:
     """Return the verdict on an arm, given all causes why it is not simply stable."""
-    return Verdict(Status.OK).with_findings(_ranked(findings))
+    return Verdict(tuple(sorted(findings, key=lambda finding: _SEVERITY.index(finding[0]))))
 
 
 def judge_stiffness(K: Stiffness) -> Verdict:
@@ -219,7 +224,3 @@ def _lever_note(arm: Manipulator) -> str:
     if not arm.slides.any() or arm.slides.all():
         return ""
     return f" (sliding joints with the arm's length, {arm.length:.4g} m, as lever)"
-
-
-def _ranked(findings: Iterable[Finding]) -> list[Finding]:
-    return sorted(findings, key=lambda finding: _SEVERITY.index(finding[0]))

@@ -58,6 +58,7 @@ def single(
     found |= {"joint_stiffness": K.joint, "cable_stiffness": K.cable_stiffness, "margin": K.margin}
     C = found["translational_compliance"] = K.compliance[:3, :3]
     found["along"] = np.array([K.along(u) for u in np.eye(3)])
+    found["slack"] = np.float64(bool(K.slack))
     status = {Status.OK if K.margin > 0.0 else Status.UNSTABLE}
     try:
         found["cartesian"], found["pseudoinverse"] = K.cartesian, K.pseudoinverse()
@@ -94,13 +95,14 @@ def test_every_entry_is_what_the_single_functions_say(everything: xr.Dataset) ->
             for name in EVERYTHING:
                 value = entry[name].values
                 if name not in found:
-                    assert np.isnan(value).all(), name
+                    missing = ~value if value.dtype == np.bool_ else np.isnan(value)
+                    assert missing.all(), name
                     continue
                 size = np.max(abs(found[name]), initial=0.0, where=np.isfinite(found[name]))
                 # the stiffest is the smallest eigenvalue of C_vv, 1e-5 of the largest here
                 rtol = 1e-7 if QUANTITIES[name].needs == "stable arm" else 1e-9
                 near = {"rtol": rtol, "atol": rtol / 100.0 * size}
-                np.testing.assert_allclose(value, found[name], **near, err_msg=name)
+                np.testing.assert_allclose(1.0 * value, found[name], **near, err_msg=name)
     names = "OK BEYOND_LIMITS INFEASIBLE OUTSIDE_ELASTICITY IMMOBILE UNSTABLE"
     assert seen == {Status[name] for name in names.split()}
 
