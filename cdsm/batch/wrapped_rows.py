@@ -62,7 +62,7 @@ def solve_wrapped(rows: Rows, threads: int, solve: Solve) -> tuple[dict[str, Arr
         status[chosen] = codes
         for name, value in solved.items():
             if name not in values:
-                values[name] = np.empty((len(rows.q), *value.shape[1:]))
+                values[name] = np.empty((len(rows.q), *value.shape[1:]), value.dtype)
             values[name][chosen] = value
     return values, status
 

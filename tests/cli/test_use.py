@@ -29,7 +29,7 @@ COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
         ),
         ("stiffness PROBE --load 0,0,-1 --set wire=48e3 --angles 5", 0, "along"),
         ("stiffness PROBE --maximum 2 --load 0,0,-50", 3, "no tension within the bounds"),
-        ("stiffness PROBE --minimum 2.21 --angles 5 --check", 3, "FAIL"),
+        ("stiffness PROBE --minimum 2.21 --angles 5 --check", 3, "NOT CHECKED"),
         ("stiffness PROBE --angles 5", 1, "Give a minimum of 2.2 N or more"),
         ("stiffness PROBE --angles 80", 1, "joint1_1 = 80° is outside"),
         ("stiffness PROBE --angles 1,2", 2, "one for each of joint1_1"),

@@ -131,7 +131,7 @@ def test_edge_of_a_law_is_not_possible(law: cdsm.Elasticity, tension: float, sai
 
 
 def test_balanced_tensions_at_the_edge_of_a_law_are_not_checked_rather_than_wrong() -> None:
-    pose = arms.prototype(STRAND, 15.0)[0].posture
+    pose = arms.prototype(STRAND, 15.0)[0]
     report = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 2.21)).report()
     assert (report.outcome, report.passed, report.faults) == ("NOT CHECKED", False, ())
     assert report.to_dict()["outcome"] == "NOT CHECKED"
