@@ -223,6 +223,8 @@ class Chunk:
         if "along" not in self._names or not rows.size:
             return
         terms = self._terms(by_all_joints, F, k, W, rows)
+        if self._rows.shifts is not None:
+            terms[:, 0] += self._rows.shifts(self._one_by_one(F), self._part)[rows]
         J_v = self._tip_jacobian(at)[rows, :3]
         torque = self._rows.directions @ J_v
         along, _, buckles = readings.one_sided_along(

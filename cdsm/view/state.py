@@ -144,7 +144,9 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
                 remedies = map(str, find_remedies(K))  # takes tenths of a second
                 problem = "\n".join([*K.warnings, *remedies])
                 return Shown(**results, status=Status.UNSTABLE, problem=problem)
-            return Shown(**results, status=Status.OK, problem="\n".join(pose.remarks))
+            status = Status.OK if K.verdict.is_held else K.verdict.status
+            problem = "\n".join([*K.warnings, *pose.remarks])
+            return Shown(**results, status=status, problem=problem)
         locked = cdsm.stuck_stiffness if arm.has_friction else stiffness
         stable = locked(pose, tension).is_stable
         rest, results["sliding"] = _rest(pose, tension, force)
