@@ -21,11 +21,13 @@ from cdsm.statics.continuation import (
     Stage,
     end_of_branch,
     equilibrium_near,
+    follow,
     rate,
+    stage_at,
 )
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import Point
-from cdsm.support.values import Array
+from cdsm.support.values import Array, frozen
 
 Kind = Literal["slack", "slip", "stop", "maximum", "law", "buckling"]
 
@@ -157,6 +159,21 @@ def events_on(
         events += _at_end(model, last, watch, force)
     order = sorted(events, key=lambda event: (event.share, event.kind == "buckling"))
     return tuple(replace(event, load=abs(event.load)) for event in order)
+
+
+def events_under(arm: LockedArm, load: Array, maximum: Array) -> tuple[Event, ...]:
+    """Locate the events while a load W (6,) grows on a locked arm that its reference balances.
+
+    ``maximum`` (C,) [N] are the largest tensions.
+    """
+
+    def model(share: float) -> LockedArm:
+        return arm.under(frozen(arm.wrench + share * load))
+
+    start = stage_at(model, arm.reference, np.zeros(arm.reference.q.size), 0.0)
+    branch = follow(model, start, 1.0)
+    force = float(np.linalg.norm(load[:3]))
+    return events_on(model, branch, watched(arm, maximum), force, 1.0)
 
 
 def _at_end(model: Model, last: Stage, watch: Watched, force: float) -> list[Event]:

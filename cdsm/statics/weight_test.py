@@ -304,8 +304,11 @@ def _buckled(model: Model, branch: list[Stage], watch: Watched, force: float) ->
     *events, end = events_on(model, branch, watch, force, 1.0)
     before = f" ({'; '.join(map(str, events))})" if events else ""
     motors = "motors that hold tensions" if branch[-1].arm.tension_held else "locked motors"
-    problem = f"with {motors} the arm buckles at {100.0 * end.share:.4g} % of the load, under {end.load:.4g} N"
+    where = f"at {100.0 * end.share:.4g} % of the load, under {end.load:.4g} N"
     residual = branch[-1].point.state.residual
     return EquilibriumError(
-        f"{problem}: {end.place} buckles{before}", residual, end.share, end.place
+        f"with {motors} the arm buckles {where}: {end.place} buckles{before}",
+        residual,
+        end.share,
+        end.place,
     )

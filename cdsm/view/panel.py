@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any, Final, final
 
 import numpy as np
 
+import cdsm
 from cdsm.cable import wires_text
+from cdsm.errors import CdsmError
 from cdsm.manipulator import Manipulator
 from cdsm.measures.indices import principal_stiffness
 from cdsm.plots.style import MM, N_PER_MM
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 _STEPS = 500  # least number of steps of a slider, which is a few hundred pixels long
 _TENSION = 200.0  # ends of sliders [N], unless the start is beyond
 _FORCE = 20.0
+_SAG_SHOWN = 0.05  # displacement at the end of a slider of the force, over the arm's length
 _PULLED = 0.1  # most wire that a motor takes in or pays out, over the arm's length
 _LENGTHS = 10.0  # largest coordinate of a prismatic joint on its slider, over the arm's length
 _ROUND = 1e-9  # largest difference of an end of a slider from a round number, over a step
@@ -73,11 +76,14 @@ class Panel:
         basis = f"wire {wires_text(arm.cables)}; gravity {coordinates(arm.gravity)} m/s²"
         gui.add_markdown(escaped(f"{arm}; {basis}; {friction or 'frictionless'}"), order=-2.0)
         self._text = gui.add_markdown("", order=-1.0)  # above the path, which has 0
-        most = max(_TENSION, start.minimum)
-        push = max(_FORCE, float(abs(start.force).max()))
+        least = min((cable.minimum for cable in arm.cables), default=0.0)
+        most = min([*(cable.maximum for cable in arm.cables), start.maximum])
+        most = most if math.isfinite(most) else _TENSION
+        applied = max(start.minimum, least)
+        push = max(_force_range(arm, start), float(abs(start.force).max()))
         self.largest_force = push
         with gui.add_folder("Load"):
-            self._load = [self.add_slider("least tension [N]", 0.0, most, start.minimum)]
+            self._load = [self.add_slider("least tension [N]", least, max(most, applied), applied)]
             for axis, value in zip("xyz", start.force.tolist(), strict=True):
                 self._load.append(self.add_slider(f"force {axis} [N]", -push, push, value))
             self._sag = self._add_switch("motors locked", start.sag, _SAG)
@@ -177,10 +183,39 @@ class Panel:
         self._sag.value = self._start.sag  # type: ignore[misc]
 
 
+def _force_range(arm: Manipulator, start: Setting) -> float:
+    """Return the end [N] of the sliders of the force: twice what the arm holds along y or z.
+
+    Where nothing bounds that, it is the force that moves the tip by 5 % of the arm's length.
+    """
+    sides = "y", "-y", "z", "-z"
+    try:
+        if start.pull is not None:
+            source: Any = cdsm.forward_statics(arm, pull=start.pull)
+            forces = []
+        else:
+            pose = arm.at(start.q)
+            held = [cdsm.payload(pose, u, start.minimum, start.maximum) for u in sides]
+            forces = [2.0 * case.limits["tension"] for case in held]
+            forces = [force for force in forces if 0.0 < force < math.inf]
+            source = cdsm.stiffness(pose, cdsm.distribute_tension(pose, start.minimum))
+        sag = [_SAG_SHOWN * arm.length * source.along(u) for u in "yz"] if not forces else []
+    except CdsmError:
+        return _FORCE
+    largest = max([*forces, *(force for force in sag if 0.0 < force < math.inf)], default=_FORCE)
+    step = 10.0 ** math.floor(math.log10(largest))
+    return math.ceil(largest / step - _ROUND) * step
+
+
 def results_text(shown: Shown, scene: Scene, remark: str = "") -> str:
     """Write the results ``shown``: status, remarks, table of numbers, legend of the scene."""
-    style = f"background:{_COLORS.get(shown.status, _GREY)};color:white;text-align:center"
-    parts = [f'<div style="{style}"><b>{shown.heading}</b></div>']
+    color = _COLORS.get(shown.status, _GREY)
+    if shown.status is Status.OK and shown.doubts:
+        color = _AMBER
+    if shown.buckled is not None:
+        color = _RED
+    style = f"background:{color};color:white;text-align:center"
+    parts = [f'<div style="{style}"><b>{escaped(shown.heading)}</b></div>']
     parts += [] if shown.status is Status.OK else [f"{shown.status.message}."]
     parts += [escaped(line) for line in (remark, shown.problem) if line]
     parts.append(_table(_numbers(shown)))

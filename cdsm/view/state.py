@@ -11,16 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
-from cdsm.errors import CdsmError
+from cdsm.errors import CdsmError, listed
 from cdsm.friction.capstan import can_stick
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture
 from cdsm.report.remedies import find_remedies
 from cdsm.statics.equilibrium import Equilibrium
+from cdsm.statics.events import Event, events_under
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.format import plural
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, distribute_tension
 
@@ -58,11 +60,41 @@ class Shown:
     stiffness: Stiffness | None = None  # stiffness at the posture that is shown
     rest: Equilibrium | None = None  # under the force, if the arm sags
     sliding: NDArray[np.bool_] | None = None  # holes (P,) in which a cable slides, if it moved
+    buckled: Event | None = None  # loss of stability before the whole force acts, if the arm sags
 
     @property
     def heading(self) -> str:
-        """The status as the page has it."""
-        return "STABLE" if self.status is Status.OK else self.status.title
+        """The status as the page has it, with all that makes a stable arm doubtful."""
+        if self.buckled is not None:
+            status = [f"BUCKLED at {self.buckled.load:.4g} N"]
+        elif self.status is Status.OK:
+            status = [] if self.doubts else ["STABLE"]
+        else:
+            status = [self.status.title]
+        return "; ".join([*status, *self.doubts])
+
+    @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """What holds an arm that is stable: a stop, slack cables, tensions above the maximum."""
+        pose = self.posture
+        if pose is None or self.tensions is None:
+            return ()
+        doubts = list[str]()
+        names = pose.arm.cables.names
+        if self.rest is not None and self.rest.at_limit:
+            doubts.append(f"rests on the stop of {listed(self.rest.at_limit, 2)}")
+        most = np.array([cable.maximum for cable in pose.arm.cables])
+        most = np.minimum(most, self.setting.maximum) * (1.0 + 1e-9)
+        above = [names[c] for c in np.flatnonzero(self.tensions > most)]
+        if above:
+            doubts.append(f"{listed(above, 2)} above the maximum")
+        if self.rest is not None and self.rest.slack:
+            doubts.append(f"{plural(len(self.rest.slack), 'cable')} slack")
+        if pose.self_contacts:
+            doubts.append("the arm touches itself")
+        if self.stiffness is not None and self.status is Status.OK:
+            doubts += self.stiffness.warnings
+        return tuple(doubts)
 
     @property
     def posture(self) -> Posture | None:
@@ -152,6 +184,12 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
         rest, results["sliding"] = _rest(pose, tension, force)
         results |= {"rest": rest, "stiffness": rest.stiffness}
         _ = rest.compliance
+        if stable and not arm.has_friction and force.any():
+            locked_arm = LockedArm(pose, tension.values, np.zeros(6))
+            events = events_under(locked_arm, force, tension.maximum_held)
+            ends = [event for event in events if event.kind == "buckling"]
+            results["buckled"] = ends[0] if ends else None
+            stable = not ends
         status = Status.OK if stable else Status.MOVED
         status = status if rest.stable else Status.NEUTRAL
         return Shown(**results, status=status, problem="\n".join(rest.pose.remarks))

@@ -166,7 +166,8 @@ def test_a_client_changes_nothing_of_a_control_but_its_value(view: View) -> None
         assert switch.value is False
         enemy.change(switch._impl.uuid, {"value": True})  # what everybody may do
         wait_for(lambda: view.shown.setting.sag)
-        for value, kept in ((1e300, 20.0), (-(2**63), -20.0), (3, 3.0)):  # within its range
+        most = view._panel.largest_force
+        for value, kept in ((1e300, most), (-(2**63), -most), (3, 3.0)):  # within its range
             enemy.change(force._impl.uuid, {"value": value})
             wait_for(lambda kept=kept: view.shown.setting.force[2] == kept)
         enemy.change(enemy.control("all"), {"value": "Reset"})

@@ -207,3 +207,27 @@ def test_what_motors_pull_gives_the_posture_and_its_numbers() -> None:
     assert beyond.status is Status.INVALID_INPUT
     assert (beyond.tensions, beyond.stiffness) == (None, None)
     assert "leaves" in beyond.problem
+
+
+def test_an_arm_that_collapsed_onto_a_stop_is_never_stable() -> None:
+    """With locked motors it buckles, and rests on a stop: the banner says so."""
+    geometry = cdsm.Geometry.universal(
+        joints=3, cables_per_joint=3, link_length=0.055, base_length=0.03, disk_offset=0.012,
+        hole_radius=0.014, link_mass=0.03, lead=0.3, joint_limit=0.4,
+    )  # fmt: skip
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(36.8e3))
+    q = np.full(arm.nv, 0.1)
+    held = cdsm.payload(arm.at(q), "-z", 10.0).locked
+    assert held is not None
+    assert held.limit.startswith("buckling")
+
+    def banner(force: float) -> Shown:
+        push = np.array([0.0, 0.0, -force])
+        return show(arm, Setting(q=q, minimum=10.0, force=push, sag=True))
+
+    beyond = banner(1.2 * held.force)
+    assert beyond.buckled is not None
+    assert beyond.buckled.load == pytest.approx(held.force, rel=1e-6)
+    assert beyond.heading.startswith(f"BUCKLED at {held.force:.4g} N")
+    assert "STABLE" not in beyond.heading
+    assert banner(0.05 * held.force).heading == "STABLE"
