@@ -40,6 +40,12 @@ PINNED = {
         "slack explains these measurements.",
         "rigid 651.18 630.85 661.87",
     ],
+    "10_pulleys_rolling_joints_sheaths": [
+        "lift off at 46.59 degrees",
+        "posts, friction 0.1: 90.2%",
+        "sheath, bent by 180 degrees: 73.3%",
+        "rolling: active term +0.0410",
+    ],
 }
 
 
