@@ -34,7 +34,7 @@ from cdsm.urdf_reader import read_urdf
 from cdsm.wires.elasticity import Elasticity
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
     from cdsm.wires.catalogue import Wire
 
@@ -183,12 +183,13 @@ class Manipulator(ComputedArm):
 
         return write_text(path, arm_text(self.definition))
 
-    def plot(self, q: ArrayLike | None = None) -> Figure:
+    def plot(self, q: ArrayLike | None = None, ax: Axes | None = None, **options: Any) -> Axes:
         """Plot the arm in mm at q (nv,) [rad]; None: each angle is 0, or the limit nearest to 0.
 
-        Raises InvalidInput as :meth:`at`.
+        Other options are those of :func:`cdsm.plots.plot_arm`. Raises InvalidInput as :meth:`at`.
         """
-        return self.at(np.clip(0.0, self.lower, self.upper) if q is None else q).plot()
+        pose = self.at(np.clip(0.0, self.lower, self.upper) if q is None else q)
+        return pose.plot(ax=ax, **options)
 
     def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:
         """Evaluate the arm at joint angles q: kinematics, cable lengths and gravity.

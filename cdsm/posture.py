@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cdsm.cable_path import positions
 from cdsm.errors import InvalidInput, listed
@@ -22,7 +23,7 @@ from cdsm.wrap_table import WrapTable, wrap_table
 from cdsm.wraps import Wrapping
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
     from cdsm.manipulator import Manipulator
 
@@ -78,13 +79,20 @@ class Posture(ReadOnlyState):
     def __repr__(self) -> str:
         return f"<Posture of {self.arm.name}, tip at {coordinates(1e3 * self.tip[:3, 3])} mm>"
 
-    def plot(self, tension: Result | None = None, stiffness: Result | None = None) -> Figure:
-        """Plot the arm in mm.
+    def plot(
+        self,
+        tension: Result | ArrayLike | None = None,
+        stiffness: Result | None = None,
+        ax: Axes | None = None,
+        **options: Any,
+    ) -> Axes:
+        """Plot the arm in mm, and return the axes.
 
         A :class:`~cdsm.Tension` colours its cables. A :class:`~cdsm.Stiffness` adds the compliance
-        of the tip.
+        of the tip. Other options are those of :func:`cdsm.plots.plot_arm`.
         """
-        return draw("plot_arm", self, tension, stiffness)
+        axes: Axes = draw("plot_arm", self, tension, stiffness, ax, **options)
+        return axes
 
     def to_dict(self) -> dict[str, object]:
         """Return angles, tip, cable lengths and moment arms for JSON; keys name the SI units."""

@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from PIL import Image
 
 import cdsm
-from cdsm.plots.arm import draw_arm, picture
-from cdsm.plots.style import COLOR_MAP, MM
+from cdsm import plots
 
 FOLDER = Path(__file__).parent / "pictures"
 FRAMES = 36
@@ -32,8 +30,7 @@ def still() -> None:
     """Draw README's arm at README's posture, with tensions and compliance."""
     pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
     tension = cdsm.distribute_tension(pose, minimum=50.0)
-    figure = cdsm.stiffness(pose, tension).plot()
-    figure.savefig(FOLDER / "arm.png", dpi=200)
+    plots.save_figure(cdsm.stiffness(pose, tension).plot(), FOLDER / "arm.png")
 
 
 def animation() -> None:
@@ -43,27 +40,17 @@ def animation() -> None:
     q = np.hstack([bend, bend, 0.6 * bend, 0.6 * bend])
     plan = cdsm.plan_path(arm, "z", 4e3, minimum=20.0, maximum=400.0, angles=q)
     assert plan.complete
-    poses = [arm.at(angles) for angles in plan.angles]
-    tips = MM * np.array([pose.tip[:3, 3] for pose in [*poses, poses[0]]])
-    scale = Normalize(plan.tensions.min(), plan.tensions.max())
-    figure, axes = picture()
-    figure.set_dpi(130)
-    figure.set_size_inches(3.5, 2.7)
-    axes.set_position((-0.14, -0.26, 1.34, 1.5))
+    limits = plan.tensions.min(), plan.tensions.max()
+    figure = Figure(figsize=(3.5, 2.6), dpi=130, layout="constrained")
+    ax = figure.subplots()
     canvas: Any = FigureCanvasAgg(figure)
     frames = []
-    for pose, values, along in zip(poses, plan.tensions, plan.achieved, strict=True):
-        axes.clear()
-        axes.set_axis_off()
-        draw_arm(axes, pose, colormaps[COLOR_MAP](scale(values)))
-        axes.plot(*tips.T, color="0.7", linewidth=0.8)
-        axes.set(xlim=(0, 270), ylim=(-110, 110), zlim=(-110, 110))
-        axes.set_box_aspect((270, 220, 220), zoom=0.86)
-        figure.suptitle(
-            f"{along.item() / 1e3:.2f} N/mm along z, tensions {values.min():.0f} to "
-            f"{values.max():.0f} N",
-            fontsize=8.0,
-        )
+    for K, along in zip(plan.stiffness, plan.achieved, strict=True):
+        ax.clear()
+        F = K.tension
+        words = f"{along.item() / 1e3:.2f} N/mm along z, {F.min():.0f} to {F.max():.0f} N"
+        plots.plot_arm(K.posture, F, ax=ax, limits=limits, title=words)
+        ax.set(xlim=(-20.0, 290.0), ylim=(-190.0, 90.0))
         canvas.draw()
         frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
     palette = frames[0].quantize(COLORS, Image.Quantize.MAXCOVERAGE)

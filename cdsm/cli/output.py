@@ -17,7 +17,9 @@ import typer
 import cdsm
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
+
+    from cdsm.plots.style import Panels
 
 Json = dict[str, object]
 """Answer for JSON: numbers in SI, units in the keys. Arrays and infinite numbers are allowed."""
@@ -122,8 +124,8 @@ def write(path: Path | None, fill: Callable[[Path], object]) -> None:
         typer.echo(f"written: {path}", err=True)
 
 
-def write_picture(path: Path | None, draw: Callable[[], Figure]) -> None:
-    """If a path is given, write the figure that ``draw`` returns."""
+def write_picture(path: Path | None, draw: Callable[[], Axes | Panels]) -> None:
+    """If a path is given, write the picture that ``draw`` draws."""
     write(path, lambda file: cdsm.plots.save_figure(draw(), file))
 
 

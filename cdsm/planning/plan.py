@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,7 +29,7 @@ from cdsm.support.values import Array, draw, frozen
 from cdsm.tension import Tension
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
     from cdsm.planning.range import StiffnessRange
 
@@ -87,13 +87,16 @@ class StiffnessPlan(Result):
         """
         return self.stiffness.free_lengths
 
-    def plot(self, attainable: StiffnessRange | None = None) -> Figure:
-        """Plot the planned tensions [N] of each cable.
+    def plot(
+        self, attainable: StiffnessRange | None = None, ax: Axes | None = None, **options: Any
+    ) -> Axes:
+        """Plot the planned tensions [N] of each cable, and return the axes.
 
-        If ``attainable`` is given, the tensions of the softest and of the stiffest arm are plotted
+        If ``attainable`` is given, the tensions of the softest and of the stiffest arm are marked
         too. Raises InvalidInput if ``attainable`` is the range of another posture or direction.
         """
-        return draw("plot_stiffness_plan", self, attainable)
+        axes: Axes = draw("plot_stiffness_plan", self, attainable, ax, **options)
+        return axes
 
     def __str__(self) -> str:
         pairs = np.reshape([self.achieved, self.target], (2, -1)).T / 1e3

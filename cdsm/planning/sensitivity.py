@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,8 +20,11 @@ from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import NO_WRENCH, Direction, bound, instance, scalar, unit_direction
-from cdsm.support.values import Array, Plotted, frozen
+from cdsm.support.values import Array, draw, frozen
 from cdsm.tension import Tension, distribute_tension
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _SAMPLES = 200  # bounds of a curve of saturation, evenly on a scale of logarithms
 _SMALLEST = 1e-4  # second bound of such a curve at least, over the last one
@@ -135,7 +138,7 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Saturation(Result, Plotted):
+class Saturation(Result):
     """Stiffness as a function of the lower bound of the tensions; made by :func:`saturation`.
 
     Attributes:
@@ -157,7 +160,6 @@ class Saturation(Result, Plotted):
 
     _headline = "bound"
     _rows = "minimum"
-    _figure = "plot_saturation"
 
     direction: Array = field(metadata=unit("1", "axis"))
     fraction: float = field(metadata=unit("1"))
@@ -173,6 +175,14 @@ class Saturation(Result, Plotted):
     def posture(self) -> Posture:
         """The posture."""
         return self.tension.posture
+
+    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """Plot the stiffness and its terms over the lower bound of all tensions; return the axes.
+
+        Other options are those of :func:`cdsm.plots.plot_stiffness_over_tension`.
+        """
+        axes: Axes = draw("plot_stiffness_over_tension", self, ax=ax, **options)
+        return axes
 
     def __str__(self) -> str:
         end = self.minimum[-1]

@@ -1,312 +1,384 @@
-"""Plot an arm in three dimensions: at a posture, along a path, in its natural modes."""
+"""Plot an arm at a posture, or several beside each other."""
 
 from __future__ import annotations
 
 import math
-import os
+import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
-from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.colors import to_rgb
+from matplotlib.patches import FancyArrowPatch, Polygon
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.planning.path_plan import PathPlan
 from cdsm.plots import style
-from cdsm.plots.style import MM
+from cdsm.plots.projection import VIEW, Drawing
+from cdsm.plots.style import MM, Panels
 from cdsm.posture import Posture
+from cdsm.statics.equilibrium import Equilibrium
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.files import as_path, write_file
-from cdsm.support.validation import instance, number_array
-from cdsm.support.values import Array, frozen
+from cdsm.support.validation import instance, vector
+from cdsm.support.values import Array
 from cdsm.tension import Tension
 
-if TYPE_CHECKING:
-    from cdsm.control.plants import PlantState
-    from cdsm.statics.modes import Modes
+TURN: Final = np.linspace(0.0, 2.0 * np.pi, 73)
+_CIRCLE: Final = np.array([np.cos(TURN), np.sin(TURN)])
 
-ELLIPSOID_GRID: Final = (13, 25)
-"""Number of points of a drawn ellipsoid: from pole to pole, and around its axis."""
-
-_CHARACTERS = 60  # of the legend in one line
-_LARGEST = 0.3  # largest half axis of a drawn ellipsoid, as a fraction of the arm's length
-_FLATTEST = 0.35  # smallest range of an axis, as a fraction of the largest
-_PADS: Final = {"x": -3.0, "y": -6.0, "z": -4.0}  # from the numbers of an axis to its label
-_UNZOOMED = 0.97  # side of the square of 3D axes, over the diagonal of their box at zoom 1
-_ELEVATION, _AZIMUTH = np.deg2rad((24.0, -62.0))  # of the eye
-_GHOSTS = 5  # number of postures that are drawn over each other
-_FRAMES = 150  # largest number of frames of an animation, and frames per second
-_RATE = 15
-_SHAPES = 3  # number of modes that are drawn
-_DEFLECTED = 0.25  # largest displacement of the tip in the picture of a mode, over the arm's length
+_MANY_DISKS = 16  # of more, the plates are fainter
+_MANY_BONES = 30  # of more, the tube is thinner
+_FAR = 0.3  # a tip that moved farther, over the arm's length, is drawn without its reference
+_MOVED = 0.2  # largest half axis of a drawn compliance, over the arm's length
+_ARROW = 0.22  # length of a drawn force, over the arm's length
+_NOTES = 3  # most lines of a warning below the picture
+_CHARACTERS = 68  # of such a line
 
 
-class Ellipsoid(NamedTuple):
-    """Ellipsoid of the tip displacements C_vv f under all forces f of 1 N, to be drawn."""
+class Scene(NamedTuple):
+    """What is drawn of an arm at one posture."""
 
-    surface: Array  # points of the drawn surface (3, 13, 25) [m]
-    scale: float  # drawn displacement over true displacement [-], a power of ten
-    longest: float  # largest true displacement per force [m/N]
-
-    def __str__(self) -> str:
-        large = max(self.scale, 1.0)
-        small = max(1.0 / self.scale, 1.0)
-        return f"where 1 N moves the tip, scale {large:g}:{small:g}"
+    pose: Posture
+    tension: Array | None  # F (C,) [N]
+    force: Array  # at the tip (3,) [N]
+    compliance: Array | None  # of the tip (6, 6), None if not asked for or not stable
+    warnings: tuple[str, ...]  # why numbers mean little
+    before: Posture | None  # drawn pale below
 
 
 @style.styled
 def plot_arm(
-    pose: Posture, tension: Tension | None = None, stiffness: Stiffness | None = None
-) -> Figure:
-    """Plot an arm in 3D: backbone, disks and cables, with equal axes in mm.
+    pose: Posture | Equilibrium,
+    tension: Tension | ArrayLike | None = None,
+    stiffness: Stiffness | None = None,
+    ax: Axes | None = None,
+    *,
+    view: ArrayLike = VIEW,
+    limits: tuple[float, float] | None = None,
+    bar: bool = True,
+    force: ArrayLike | None = None,
+    scale: float | None = None,
+    names: bool = False,
+    triad: bool = True,
+    title: str | None = None,
+) -> Axes:
+    """Plot an arm in mm: backbone, disks, cables, how a load moves its tip; return the axes.
 
-    A robot from a URDF has no disks. Its joints are drawn instead: circles are revolute, squares
-    prismatic. A thin line joins each cable site to its link.
+    Disks are plates; those of links that overlap are red. A robot from a URDF has no disks. Its
+    joints are drawn instead, circles are revolute and squares prismatic, and a thin line joins each
+    cable site to its link.
 
     Args:
-        pose: Posture to draw.
-        tension: Tensions that colour the cables, if given.
-        stiffness: Of a stable arm, drawn as an ellipsoid at the tip: the displacements C_vv f under
-            forces f of 1 N, at the scale of the legend. Of an unstable one the title says so.
+        pose: Posture to draw, or an equilibrium, which brings its tensions, compliance and load; if
+            its tip moved by less than 0.3 of the arm's length, its reference is drawn pale below.
+        tension: Tensions, or F (C,) [N], that colour the cables. Slack cables are dashed.
+        stiffness: Its compliance is drawn at the tip: the outline of the displacements C_vv f under
+            forces f of 1 N, or of a power of ten below that. Of an unstable arm the note says so.
+        ax: Ordinary axes to draw on; None: a new figure of one column.
+        view: Elevation and azimuth of the eye [deg].
+        limits: Tensions [N] at the ends of the colours; None: the smallest and the largest.
+        bar: Whether to draw the colour bar of the tensions.
+        force: Force (3,) [N] at the tip, drawn as an arrow with its size; None: that of the
+            stiffness or the equilibrium.
+        scale: By which displacements of the outline are enlarged; None: a round number.
+        names: Whether to write the names of the cables at their ends.
+        triad: Whether to draw the base axes.
+        title: Title; None: the arm's name and the question that the picture answers.
 
     Raises:
         InvalidInput: An argument has the wrong type, or belongs to another arm or posture.
-        SingularStiffness: K_θ is singular, so the ellipsoid does not exist.
     """
-    instance("pose", pose, Posture)
-    figure, axes = picture()
-    scale = shades = None
-    if tension is not None:
-        instance("tension", tension, Tension)
-        if tension.posture.arm != pose.arm:
-            raise InvalidInput("tension", "belongs to another arm than the posture.")
-        scale = color_scale(tension.values)
-        shades = scale.to_rgba(tension.values)
-    draw_arm(axes, pose, shades)
-    title = pose.arm.name
-    if stiffness is not None:
-        instance("stiffness", stiffness, Stiffness)
-        if not stiffness.posture.equals(pose):
-            problem = "belongs to another posture or arm; compute it for this one."
-            raise InvalidInput("stiffness", problem)
-        if not stiffness.is_stable:
-            return finish(figure, f"UNSTABLE: {title}", scale)
-        drawn = ellipsoid(stiffness.compliance[:3, :3], pose.tip[:3, 3], pose.arm.length)
-        if drawn is not None:
-            label = f"{drawn}; longest: {MM * drawn.longest:.3g} mm"
-            look = {"color": style.VERMILLION, "linewidth": 0.4, "label": label}
-            axes.plot_wireframe(*(MM * drawn.surface), **look)
-    return finish(figure, title, scale)
+    scene = _scene(pose, tension, stiffness, force)
+    panel = style.panel(ax, 2.2)
+    length = scene.pose.arm.length
+    drawing = Drawing(panel, view, length)
+    if scene.before is not None:
+        draw_ghost(drawing, scene.before)
+    colors = None if scene.tension is None else style.tension_colors(scene.tension, limits)
+    draw_arm(drawing, scene.pose, scene.tension, colors)
+    if names:
+        _draw_names(drawing, scene.pose)
+    notes: list[tuple[str, str]] = []
+    if scene.compliance is not None:
+        notes.append((draw_compliance(drawing, scene, scale), style.VERMILLION))
+    draw_force(drawing, scene)
+    drawing.finish(triad=triad, fit=ax is None)
+    style.set_title(panel, title, f"{scene.pose.arm.name}: {_question(scene)}")
+    if scene.tension is not None:
+        slack = scene.tension <= style.slack_below(scene.tension)
+        if slack.any():
+            words = f"dashed: {slack.sum()} of {slack.size} cables are slack"
+            notes.append((words, style.SOFT))
+        if bar and colors is not None and not slack.all():
+            style.color_bar_beside(panel, colors, "N")
+    if scene.before is not None:
+        notes.append(("pale: the reference, at which the motors were locked", style.SOFT))
+    for warning in scene.warnings:
+        lines = textwrap.wrap(warning, _CHARACTERS, max_lines=_NOTES, placeholder=" …")
+        notes += [(line, style.VERMILLION) for line in lines]
+    for line, (text, color) in enumerate(notes):
+        style.note(panel, text, line, color)
+    return panel
 
 
 @style.styled
-def plot_path(
-    path: PathPlan | Sequence[Posture | PlantState],
+def plot_arms(
+    cases: Sequence[tuple[Any, ...]],
+    axs: Panels | Sequence[Axes] | None = None,
     *,
-    animate: str | os.PathLike[str] | None = None,
-    tensions: ArrayLike | None = None,
-) -> Figure:
-    """Plot some postures of a path over each other, from pale to dark, with the path of the tip.
+    view: ArrayLike = VIEW,
+    **options: Any,
+) -> Panels:
+    """Plot arms beside each other with one scale of mm, of tensions and of displacements.
 
     Args:
-        path: Postures of one arm, in order, or states with a ``pose``, as of a tracking run; or a
-            plan, of which the feasible samples are drawn.
-        animate: A ``.gif`` to write too: the arm follows the path, with cables coloured by tension.
-        tensions: Tensions (P, C) [N] for the colours at P postures; default: those of a plan.
+        cases: Of each arm (pose, tension, stiffness, title), of which all but the first may be
+            None or missing; as in :func:`plot_arm`.
+        axs: Ordinary axes, one or more for each case; None: a new figure of two columns.
+        view: Elevation and azimuth of the eye [deg].
+        **options: Other options of :func:`plot_arm`.
 
     Raises:
-        InvalidInput: ``path`` has no postures of one arm, or ``animate`` does not end in ``.gif``.
-        FileError: The animation cannot be written.
+        InvalidInput: As :func:`plot_arm`; or there are no cases, or too few axes.
     """
-    poses: Sequence[Any]
-    if isinstance(path, Sequence):
-        poses = [getattr(state, "pose", state) for state in path]
-        for pose in poses:
-            instance("path", pose, Posture)
-    else:
-        instance("path", path, PathPlan)
-        poses = [K.posture for K in path.stiffness]
-        tensions = path.tensions if tensions is None else tensions
-    if not poses or any(pose.arm != poses[0].arm for pose in poses):
-        problem = "give postures of one arm, or a plan that reaches its target at some samples."
-        raise InvalidInput("path", problem)
-    figure, axes = picture()
-    *ghosts, last = (poses[k] for k in _some(len(poses), _GHOSTS))
-    for pose, shade in zip(ghosts, np.linspace(0.8, 0.5, len(ghosts)), strict=True):
-        draw_bones(axes, pose, color=f"{shade:.2f}", linewidth=2.0)
-    draw_arm(axes, last)
-    tips = MM * np.array([pose.tip[:3, 3] for pose in poses])
-    axes.plot(*tips.T, color=style.VERMILLION, label="path of the tip")
-    axes.plot(*tips[-1:].T, "o", color=style.VERMILLION, label="its end")
-    finish(figure, f"{last.arm.name}: the last of {len(poses)} postures, others pale")
-    if animate is not None:
-        values = None if tensions is None else number_array("tensions", tensions)
-        _animate(animate, poses, values, axes)
-    return figure
+    if not cases:
+        raise InvalidInput("cases", "is empty; give a posture, or more.")
+    rows = [(*case, None, None, None)[:4] for case in cases]
+    scenes = [_scene(pose, tension, stiffness) for pose, tension, stiffness, _ in rows]
+    chosen = style.panels(axs, len(rows), height=2.4)
+    every = np.concatenate(
+        [np.zeros(0), *(scene.tension for scene in scenes if scene.tension is not None)]
+    )
+    limits = style.tension_colors(every).get_clim()
+    moves = [
+        np.linalg.norm(scene.compliance[:3, :3], 2)
+        for scene in scenes
+        if scene.compliance is not None
+    ]
+    length = max(scene.pose.arm.length for scene in scenes)
+    shared: dict[str, Any] = {"view": view, "limits": limits if every.size else None}
+    if moves and max(moves) > 0.0:
+        shared["scale"] = _scale(float(max(moves)), length)[1]
+    for k, (ax, (pose, tension, stiffness, title)) in enumerate(zip(chosen, rows, strict=True)):
+        ends: dict[str, Any] = {"bar": k == len(rows) - 1, "triad": k == 0}
+        plot_arm(pose, tension, stiffness, ax, title=title, **{**shared, **ends, **options})
+    for limit in ("xlim", "ylim"):
+        ranges = [getattr(ax, f"get_{limit}")() for ax in chosen]
+        half = max(high - low for low, high in ranges) / 2.0
+        for ax, (low, high) in zip(chosen, ranges, strict=True):
+            ax.set(**{limit: ((low + high) / 2.0 - half, (low + high) / 2.0 + half)})
+    return chosen
 
 
-@style.styled
-def plot_modes(modes: Modes) -> Figure:
-    """Plot an arm in mm, deflected by up to three modes: growing modes first, then the lowest."""
-    pose = modes.stiffness.posture
-    figure, axes = picture()
-    draw_bones(axes, pose, color="0.6", linewidth=2.0)
-    names = [f"grows at {rate:.3g}/s" for rate in modes.growth_rates]
-    names += [f"{frequency:.3g} Hz" for frequency in modes.frequencies]
-    shapes = np.hstack([modes.growth_shapes, modes.shapes]).T
-    for shape, name, color in zip(shapes, names, style.COLORS[:_SHAPES], strict=False):
-        moved = np.linalg.norm(pose.jacobian[:3] @ shape) / pose.arm.length
-        step = _DEFLECTED / max(moved, np.linalg.norm(shape)) * shape
-        draw_bones(axes, pose.arm.at(pose.q + step, check_limits=False), color=color)
-        axes.plot([], [], [], color=color, label=name)
-    unstable = "" if modes.is_stable else "UNSTABLE: "
-    return finish(figure, f"{unstable}{pose.arm.name}, enlarged modes")
+def _scene(
+    pose: object, tension: object, stiffness: object, force: ArrayLike | None = None
+) -> Scene:
+    """Check the arguments of :func:`plot_arm`, and return what they ask to draw."""
+    before = compliance = None
+    warnings: tuple[str, ...] = ()
+    load = np.zeros(3)
+    if isinstance(pose, Equilibrium):
+        rest = pose
+        pose = rest.pose
+        near = 0.0 < rest.moved < _FAR * pose.arm.length
+        before = rest.reference if near else None
+        tension = rest.tension if tension is None else tension
+        load = rest.wrench[:3]
+        warnings = rest.warnings
+        compliance = rest.compliance if rest.stable and stiffness is None else None
+    instance("pose", pose, Posture)
+    assert isinstance(pose, Posture)
+    if stiffness is not None:
+        instance("stiffness", stiffness, Stiffness)
+        assert isinstance(stiffness, Stiffness)
+        K = stiffness
+        if not K.posture.equals(pose):
+            problem = "belongs to another posture or arm; compute it for this one."
+            raise InvalidInput("stiffness", problem)
+        load = K.wrench[:3]
+        warnings = (*warnings, *K.warnings)
+        compliance = K.compliance if K.is_stable else None
+    if isinstance(tension, Tension) and tension.posture.arm != pose.arm:
+        raise InvalidInput("tension", "belongs to another arm than the posture.")
+    values = None
+    if tension is not None:
+        values = vector("tension", np.asarray(tension), len(pose.arm.cables), "one [N] per cable")
+    if force is not None:
+        load = vector("force", force, 3, "a force [N] in base axes")
+    return Scene(pose, values, load, compliance, warnings, before)
 
 
-def ellipsoid(compliance: Array, tip: Array, length: float) -> Ellipsoid | None:
-    """Scale the ellipsoid of C_vv (3, 3) [m/N] at the tip (3,) to 3 to 30 % of ``length`` [m].
-
-    None if no force moves the tip.
-    """
-    longest = float(np.linalg.norm(compliance, 2))
-    if longest == 0.0:
-        return None
-    rows, columns = ELLIPSOID_GRID
-    turn, down = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, columns), np.linspace(0.0, np.pi, rows))
-    force = np.stack([np.sin(down) * np.cos(turn), np.sin(down) * np.sin(turn), np.cos(down)])
-    scale = 10.0 ** math.floor(math.log10(_LARGEST * length / longest))
-    moved = scale * np.einsum("ij,j...->i...", compliance, force)
-    return Ellipsoid(frozen(moved + tip[:, None, None]), scale, longest)
+def _question(scene: Scene) -> str:
+    if scene.before is not None:
+        return "where does it come to rest?"
+    if scene.compliance is not None:
+        return "how far does a load move its tip?"
+    return "how does it stand?" if scene.tension is None else "how hard do its cables pull?"
 
 
-def color_scale(tensions: Array) -> ScalarMappable:
-    """Build the colour scale from the smallest to the largest of ``tensions`` [N]."""
-    low = tensions.min()
-    high = tensions.max()
-    return ScalarMappable(Normalize(low, max(high, low + 1e-9)), style.COLOR_MAP)
+def draw_ghost(drawing: Drawing, pose: Posture, shade: str = "0.86") -> None:
+    """Draw an arm as pale lines, below another one."""
+    for path in pose.cable_paths:
+        drawing.ax.plot(*drawing.flat(path).T, color=shade, lw=0.5, zorder=1)
+    draw_bones(drawing, pose, shade, "ghost")
 
 
-def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
-    """Draw an arm on existing 3D axes; ``colors`` (C, 4) are the RGBA colours of its cables."""
-    arm = pose.arm
-    if arm.is_serpentine:
-        turn = np.linspace(0.0, 2.0 * np.pi, 49)
-        for disk in arm.geometry.disks:
-            placement = pose.link_pose(disk.link)
-            ring = [0.0 * turn + disk.x, disk.radius * np.cos(turn), disk.radius * np.sin(turn)]
-            edge = placement[:3, 3:] + placement[:3, :3] @ np.array(ring)
-            axes.plot(*(MM * edge), color="0.45", linewidth=0.6)
-    else:
-        for bracket in pose.brackets:  # from cable sites to their links
-            axes.plot(*(MM * bracket.T), color="0.5", linewidth=0.8)
-        for marker, label, chosen in (("o", "turns", ~arm.slides), ("s", "slides", arm.slides)):
-            look = {"color": "0.1", "mfc": "white", "zorder": 5, "ls": ""}
-            named = {"label": label} if arm.slides.any() else {}
-            axes.plot(*(MM * pose.joint_positions[chosen].T), marker, **look, **named)
-    draw_bones(axes, pose, color="0.1", linewidth=2.0)
-    if pose.wrapping:  # pulleys; dashed where the cable does not touch
-        for rim, touches in zip(pose.wrapping.rims, pose.wrapping.touches, strict=True):
-            look = {"color": "0.45", "linewidth": 0.6, "linestyle": "-" if touches else "--"}
-            axes.plot(*(MM * rim.T), **look)
-    for i, path in enumerate(pose.cable_paths):
-        axes.plot(*(MM * path.T), color=style.SKY if colors is None else colors[i], linewidth=0.9)
+def draw_bones(drawing: Drawing, pose: Posture, color: str, name: str) -> None:
+    """Draw the links of an arm as thick lines of one colour between its joints."""
+    width = 3.0 if len(pose.bones) < _MANY_BONES else 1.8
+    for k, bone in enumerate(pose.bones):
+        line = drawing.flat(bone).T
+        drawing.ax.plot(*line, color=color, lw=width, zorder=1.2, gid=f"{name}:{k}")
 
 
-def draw_bones(axes: Any, pose: Posture, **line: Any) -> None:
-    """Draw the links of an arm as lines between its joints."""
-    for bone in pose.bones:
-        axes.plot(*(MM * bone.T), **line)
-
-
-def picture() -> tuple[Figure, Any]:
-    """Build a figure of one column with 3D axes, to be completed by :func:`finish`."""
-    figure = Figure(figsize=(style.ONE_COLUMN, style.ONE_COLUMN))
-    figure.set_layout_engine("none")
-    axes: Any = figure.add_subplot(projection="3d")
-    axes.view_init(*np.rad2deg([_ELEVATION, _AZIMUTH]))
-    return figure, axes
-
-
-def frame_arms(axes: Any, label: str = "{} [mm]") -> Array:
-    """Give 3D axes equal scales, few ticks, and labels in which {} is the axis; return ranges."""
-    limits = np.reshape(axes.get_w_lims(), (3, 2))
-    ranges = np.ptp(limits, axis=1)
-    ranges = np.maximum(ranges, _FLATTEST * ranges.max())  # keep space around a flat arm
-    middles = limits.mean(axis=1)
-    for (name, pad), middle, size in zip(_PADS.items(), middles, ranges, strict=True):
-        ticks = MaxNLocator(max(2, round(5.0 * size / ranges.max())), prune="both")
-        getattr(axes, f"{name}axis").set_major_locator(ticks)
-        getattr(axes, f"set_{name}label")(label.format(name), labelpad=pad)
-        getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
-    axes.tick_params(pad=-3.0)
-    axes.tick_params("z", pad=0.0)
-    axes.set_box_aspect(ranges)
-    return np.asarray(ranges)
-
-
-def finish(
-    figure: Figure, title: str, colors: ScalarMappable | None = None, label: str = "{} [mm]"
-) -> Figure:
-    """Complete a 3D picture, and make it as high as the box of the axes looks from the eye."""
-    axes: Any = figure.axes[0]
-    ranges = frame_arms(axes, label)
-    side = abs(np.array([math.sin(_AZIMUTH), math.cos(_AZIMUTH), 0.0]))
-    up = abs(np.array([*(math.sin(_ELEVATION) * side[[1, 0]]), math.cos(_ELEVATION)]))
-    width = style.ONE_COLUMN * (1.0 if colors is None else 0.82)
-    scale = (width - 0.95) / float(side @ ranges)  # inch per mm
-    labels = axes.get_legend_handles_labels()[1]
-    columns = 3 if sum(map(len, labels)) < _CHARACTERS else 1
-    below = 0.1 + 0.2 * -(-len(labels) // columns) if labels else 0.05
-    height = scale * float(up @ ranges) + 0.4
-    total = height + below + 0.25
-    figure.set_size_inches(style.ONE_COLUMN, total)
-    axes.set_position((-0.07, (below + 0.14) / total, width / style.ONE_COLUMN, height / total))
-    zoom = _UNZOOMED * scale * float(np.linalg.norm(ranges)) / min(height, width)
-    axes.set_box_aspect(ranges, zoom=zoom)
-    _unclip(axes)
-    style.titled(figure, title)
-    if labels:
-        figure.legend(loc="lower center", ncols=columns, frameon=False)
-    if colors is not None:
-        bar = figure.add_axes((0.83, 0.2, 0.025, 0.6))
-        figure.colorbar(colors, cax=bar, label="cable tension [N]")
-    return figure
-
-
-def _some(count: int, most: int) -> list[int]:
-    """Return up to ``most`` of ``count`` indices, evenly spaced, with both ends."""
-    return sorted({round(k) for k in np.linspace(0, count - 1, most).tolist()})
-
-
-def _animate(
-    path: str | os.PathLike[str], poses: Sequence[Posture], tensions: Array | None, like: Any
+def draw_arm(
+    drawing: Drawing,
+    pose: Posture,
+    tension: Array | None = None,
+    colors: ScalarMappable | None = None,
 ) -> None:
-    """Write a GIF of up to 150 postures, coloured by tension, within the limits of ``like``."""
-    if as_path(path).suffix.lower() != ".gif":
-        raise InvalidInput("animate", f"{str(path)!r} given; it must end in .gif.")
-    figure, axes = picture()
-    colors = None if tensions is None else color_scale(tensions)
-    axes.auto_scale_xyz(*np.reshape(like.get_w_lims(), (3, 2)))
-    finish(figure, " ", colors)
+    """Draw backbone, disks or joints, and cables, coloured by tension (C,) [N]."""
+    if pose.arm.is_serpentine:
+        _draw_disks(drawing, pose)
+    else:
+        _draw_joints(drawing, pose)
+    width = 3.5 if len(pose.bones) < _MANY_BONES else 2.0
+    for k, bone in enumerate(pose.bones):
+        line = drawing.flat(bone).T
+        drawing.ax.plot(*line, color="0.55", lw=width + 0.9, zorder=1.5)
+        drawing.ax.plot(*line, color="0.8", lw=width, zorder=1.6, gid=f"bone:{k}")
+    if pose.wrapping:  # pulleys; dashed where the cable does not touch
+        for k, (rim, touches) in enumerate(
+            zip(pose.wrapping.rims, pose.wrapping.touches, strict=True)
+        ):
+            look: dict[str, Any] = {"color": "0.45", "lw": 0.7, "ls": "-" if touches else "--"}
+            drawing.ax.plot(
+                *drawing.flat(rim).T, zorder=drawing.layer(rim), gid=f"pulley:{k}", **look
+            )
+    pull = np.full(len(pose.arm.cables), np.nan) if tension is None else tension
+    slack = pull <= style.slack_below(pull)
+    for name, path, F, is_slack in zip(
+        pose.arm.cables.names, pose.cable_paths, pull, slack, strict=True
+    ):
+        color: Any = style.SKY if colors is None else colors.to_rgba(F)
+        _draw_cable(drawing, path, f"cable:{name}", None if is_slack else color, colors is not None)
 
-    def draw(k: int) -> None:
-        for line in list(axes.lines):
-            line.remove()
-        shades = None if colors is None or tensions is None else colors.to_rgba(tensions[k])
-        draw_arm(axes, poses[k], shades)
-        _unclip(axes)
-        style.titled(figure, f"{poses[0].arm.name}, posture {k} of {len(poses) - 1}")
 
-    film: Any = FuncAnimation(figure, draw, _some(len(poses), _FRAMES), init_func=lambda: None)
-    write_file(path, lambda aside: film.save(aside, PillowWriter(_RATE), dpi=figure.dpi))
+def _draw_cable(drawing: Drawing, path: Array, name: str, color: Any, wide: bool) -> None:
+    """Draw a cable segment by segment; one without a colour is slack, and dashed."""
+    look: dict[str, Any] = {"color": color, "lw": 1.3 if wide else 0.8}
+    if color is None:
+        look = {"color": "0.35", "ls": (0, (2.0, 1.8)), "lw": 0.8}
+    for k, segment in enumerate(drawing.flat(path[i : i + 2]) for i in range(len(path) - 1)):
+        layer = drawing.layer(path[k : k + 2])
+        if wide and color is not None:
+            # a white rim shows which of two crossing cables is in front
+            rim = segment.mean(axis=0) + 0.8 * (segment - segment.mean(axis=0))
+            drawing.ax.plot(*rim.T, color="white", lw=2.5, solid_capstyle="butt", zorder=layer)
+        drawing.ax.plot(*segment.T, zorder=layer + 1e-3, gid=f"{name}:{k}", **look)
 
 
-def _unclip(axes: Any) -> None:
-    """Let lines and surfaces be seen outside the square of 3D axes, which is less than the box."""
-    for artist in (*axes.lines, *axes.collections):
-        artist.set_clip_on(False)
+def _draw_disks(drawing: Drawing, pose: Posture) -> None:
+    disks = list(pose.arm.geometry.disks)
+    touching = {link for pair in pose.self_contacts for link in pair}
+    for disk in disks:
+        placement = pose.link_pose(disk.link)
+        ring = np.c_[0.0 * TURN + disk.x, disk.radius * _CIRCLE.T]
+        rim = placement[:3, 3] + ring @ placement[:3, :3].T
+        look: dict[str, Any] = {"fc": (*to_rgb("0.72"), 0.32), "ec": "0.5", "lw": 0.5}
+        if len(disks) > _MANY_DISKS:
+            look["fc"] = (*to_rgb("0.72"), 0.22)
+        layer = drawing.layer(rim)
+        if disk.link == disks[0].link:
+            look |= {"ec": "0.25", "lw": 0.8}
+        if disk.link in touching:
+            look = {"fc": (*to_rgb(style.VERMILLION), 0.5), "ec": style.VERMILLION, "lw": 1.2}
+            layer += 2.0
+        plate = Polygon(drawing.flat(rim), closed=True, zorder=layer, **look)
+        plate.set_gid(f"disk:{disk.index}")
+        drawing.ax.add_patch(plate)
+
+
+def _draw_joints(drawing: Drawing, pose: Posture) -> None:
+    for bracket in pose.brackets:  # from cable sites to their links
+        layer = drawing.layer(bracket)
+        drawing.ax.plot(*drawing.flat(bracket).T, color="0.65", lw=0.7, zorder=layer)
+    slides = np.asarray(pose.arm.slides)
+    look: dict[str, Any] = {"ls": "", "mfc": "white", "mec": "0.25", "mew": 0.8, "ms": 4.5}
+    for marker, name, chosen in (("o", "turns", ~slides), ("s", "slides", slides)):
+        if chosen.any():
+            points = drawing.flat(pose.joint_positions[chosen]).T
+            drawing.ax.plot(*points, marker, zorder=5, gid=f"joints:{name}", **look)
+
+
+def _draw_names(drawing: Drawing, pose: Posture) -> None:
+    for name, path in zip(pose.arm.cables.names, pose.cable_paths, strict=True):
+        x, y = drawing.flat(path[-1])
+        look: dict[str, Any] = {"fontsize": style.NOTE_SIZE, "color": "0.3", "zorder": 8}
+        drawing.ax.annotate(name, (x, y), xytext=(2, 2), textcoords="offset points", **look)
+
+
+def draw_compliance(drawing: Drawing, scene: Scene, scale: float | None) -> str:
+    """Draw where a force in any direction moves the tip, and return the words below the picture.
+
+    The outline of an ellipsoid C f, |f| = 1, under an orthographic projection P is an ellipse: its
+    half axes are the square roots of the eigenvalues of P C Cᵀ Pᵀ.
+    """
+    assert scene.compliance is not None
+    C = scene.compliance[:3, :3]
+    axes, moves, _ = np.linalg.svd(C)
+    if moves[0] == 0.0:
+        return "no load moves its tip"
+    force, enlarged = _scale(float(moves[0]), scene.pose.arm.length)
+    enlarged = enlarged if scale is None else scale
+    tip = drawing.flat(scene.pose.tip[:3, 3])
+    half = enlarged * force * drawing.unit * (drawing.rows[:2] @ axes * moves)  # (2, 3)
+    values, vectors = np.linalg.eigh(half @ half.T)
+    outline = tip + (vectors * np.sqrt(np.maximum(values, 0.0)) @ _CIRCLE).T
+    drawing.include(outline)
+    look: dict[str, Any] = {"fc": (*to_rgb(style.VERMILLION), 0.18), "ec": style.VERMILLION}
+    edge = Polygon(outline, closed=True, lw=0.8, zorder=6, **look)
+    edge.set_gid("compliance")
+    drawing.ax.add_patch(edge)
+    for axis in half.T:
+        ends = np.array([tip - axis, tip + axis]).T
+        drawing.ax.plot(*ends, color=style.VERMILLION, lw=0.5, alpha=0.8, zorder=6.1)
+    times = "" if enlarged == 1.0 else f", drawn × {enlarged:g}"
+    size = f"{force:g} N" if force > 1e-3 else f"{1e3 * force:g} mN"
+    return f"{size} moves it by up to {_length(MM * force * moves[0])}{times}"
+
+
+def draw_force(drawing: Drawing, scene: Scene) -> None:
+    """Draw the tip, and the force on it as an arrow with its size."""
+    tip = scene.pose.tip[:3, 3]
+    start = drawing.flat(tip)
+    drawing.ax.plot(*start, "o", ms=2.5, color=style.INK, zorder=6.5, gid="tip")
+    size = float(np.linalg.norm(scene.force))
+    if size == 0.0:
+        return
+    end = drawing.flat(tip + _ARROW * scene.pose.arm.length * scene.force / size)
+    look: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 7, "lw": 1.4, "zorder": 7}
+    look |= {"color": style.PURPLE, "shrinkA": 0, "shrinkB": 0}
+    arrow = FancyArrowPatch(tuple(start), tuple(end), **look)
+    arrow.set_gid("force")
+    drawing.ax.add_patch(arrow)
+    right = end[0] >= start[0]
+    look = {"fontsize": 7, "color": style.DARK[style.PURPLE], "va": "center", "zorder": 8}
+    look |= {"xytext": (3 if right else -3, 0), "textcoords": "offset points"}
+    drawing.ax.annotate(f"{size:.3g} N", tuple(end), ha="left" if right else "right", **look)
+
+
+def _scale(longest: float, length: float) -> tuple[float, float]:
+    """Return the force [N] of a drawn compliance, and by how much displacements are enlarged.
+
+    ``longest`` is the largest displacement per force [m/N], ``length`` that of the arm [m].
+    """
+    most = _MOVED * length
+    force = 10.0 ** min(0.0, math.floor(math.log10(most / longest)))
+    return force, style.round_number(most / (force * longest))
+
+
+def _length(millimetres: float) -> str:
+    return f"{millimetres:.2g} mm" if millimetres < 99.5 else f"{millimetres:.0f} mm"

@@ -1,104 +1,105 @@
-"""Plot workspace maps: reachable tip positions, coloured by stiffness, as dots or as cells."""
+"""Plot maps of a sweep: filled cells over joints or tips, with what does not hold hatched."""
 
 from __future__ import annotations
 
 import itertools
+import math
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import LogNorm, Normalize
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput
 from cdsm.plots import style
-from cdsm.plots.style import MM
+from cdsm.plots.style import MM, Panels
 from cdsm.quantities import display_of, si_of
+from cdsm.status import Status
+from cdsm.support.format import one_unit
 from cdsm.support.status import check_sweep, status_names
-from cdsm.support.validation import one_of, scalar
+from cdsm.support.validation import XYZ, one_of, scalar
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     import xarray
 
-    View = tuple[str, int, NDArray[np.bool_], bool]  # title, normal axis, tips, whether a slice
-
 Statistic = Literal["median", "min", "max"]
 
 _MOST_PANELS = 9
-_CELLS = 40  # along the longest side of a map
-_WIDE = 30.0  # the colours are logarithmic if the ratio of largest to smallest value exceeds this
-_ROBUST: Final = (2.0, 98.0)  # percentiles at the ends of the colours, as in xarray
+_POSTURES = 8  # per cell of a slice, from which the size of its cells follows
+_CELLS = (6, 40)  # least and largest number of cells along the longest side of a slice
+_WIDE = 8.0  # the colours are logarithmic if the ratio of largest to smallest value exceeds this
+_ROBUST: Final = (1.0, 99.0)  # percentiles at the ends of the colours
 _FLAT = 1e-9  # tips are in a plane if an extent is below this part of the largest
-_THIN = 0.3  # least ratio of the sides of a map, which leaves room for its labels
-_MARGIN = 0.05  # around the tips, over their largest extent
-_TALLEST = 2.3  # largest height of a map [inch]
-_CHARACTERS = 15.0  # of a label in an inch
-_TICK = 0.6  # least space for the label of a tick [inch]
-_LABELS = 0.75  # space for the labels beside and below a map [inch]
-_BAR = 1.0  # width of the colour bar with its label, height of the title [inch]
-_HEADING = 0.6
-_HUGE = 1e300
 _SLICE = 0.04  # half thickness of the slices of a cloud of tips, divided by its extent
+_HUGE = 1e300
+_EDGE = 1e-6  # of a cell, so that tips at the last edge are inside
 
-_NONE: Final = {"marker": ".", "c": "0.6", "s": 8.0, "label": "no value"}
-_UNSTABLE: Final = {"marker": "x", "c": style.VERMILLION, "s": 14.0, "lw": 0.7, "label": "unstable"}
+_FAULTS: Final = {
+    Status.UNSTABLE: ("unstable", "#fbe3d6", "//////", style.VERMILLION),
+    Status.INFEASIBLE: ("no balance", "0.94", "......", "0.55"),
+    Status.OUTSIDE_ELASTICITY: ("beyond the wire", "#e6eef6", "xxxxxx", style.SKY),
+    Status.OUT_OF_REACH: ("out of reach", "0.97", "", "0.97"),
+}
+"""Words, colour, hatch and its colour of cells without a value, by the status of their entries."""
+
+_OTHER: Final = ("no value", "0.9", "\\\\\\\\", "0.6")
 
 
-class Map(NamedTuple):
-    """The tips in one panel, with their values and whether the arm is unstable there."""
+class Cells(NamedTuple):
+    """A panel of a map: edges of its cells, a value in each, and why some have none."""
 
     title: str
-    plane: list[int]  # indices of the two base axes that the panel shows
-    points: Array  # tips (N, 2) [mm]
-    values: Array  # the quantity (N,), NaN if missing
-    unstable: NDArray[np.bool_]  # (N,)
-    slice: bool  # whether this is one of the slices of a cloud
-
-    def box(self) -> tuple[Array, Array]:
-        """Return the middle and the extent (2,) of the box around the tips [mm]."""
-        every = self.points if len(self.points) else np.zeros((1, 2))
-        extent = np.ptp(every, axis=0)
-        return every.min(axis=0) + extent / 2.0, extent if extent.any() else extent + 1.0
-
-    def limits(self) -> Array:
-        """Return the ends of both axes of the panel (2, 2) [mm]."""
-        middle, extent = self.box()
-        half = extent / 2.0 + _MARGIN * extent.max()
-        half = np.maximum(half, _THIN * half.max())
-        return np.transpose([middle - half, middle + half])
+    x: Array  # edges (m + 1,)
+    y: Array  # edges (n + 1,)
+    values: Array  # (n, m), NaN where none is
+    faults: dict[str, NDArray[np.bool_]]  # where no value is (n, m), by words
+    labels: tuple[str, str]  # of the two axes
+    scale: str  # panels of one scale share their colours
+    heading: str = ""  # in words, how many postures are inside
 
 
 @style.styled
 def plot_map(
     dataset: xarray.Dataset,
     quantity: str = "softest",
+    axs: Panels | Sequence[Axes] | None = None,
     *,
     section: tuple[str, float, float] | None = None,
-    statistic: Statistic | None = None,
-) -> Figure:
-    """Plot the tips of a sweep in mm, coloured by a quantity, with a panel for each case.
+    statistic: Statistic = "median",
+    title: str | None = None,
+) -> Panels:
+    """Plot a quantity of a sweep as filled cells, a panel for each case; return the axes.
 
-    Tips in a plane and tips in a section are drawn as dots, or as cells if a statistic is given. A
-    cloud of tips is drawn in three slices through its middle, as cells; a path is drawn as dots, as
-    seen along each axis. Several postures may put the tip into one cell; the statistic determines
-    the value that the cell shows. An entry (a posture in a case) without the quantity has a cross
-    if it is unstable, else a grey dot. Unstable entries are not coloured, except in a map of the
-    margin. The colours end at the 2nd and the 98th percentile.
+    The cells of :class:`~cdsm.PlanePoses` are tips in a plane, those of a grid over two joints are
+    their angles. Other tips in a plane, tips in a section, and a cloud of tips in three slices
+    through its middle are put into square cells, whose size follows from the number of postures.
+    Postures of a path and of a grid over one joint are drawn as a curve.
+
+    A cell whose postures have no value is hatched: unstable, no balance, or beyond the law of a
+    wire. Directions have a scale of colours each, as other quantities would; it is logarithmic if
+    it spans more than 8 : 1, ends at the 1st and 99th percentile, and has its middle at zero if the
+    quantity has both signs. Over each panel are the values that 10, 50 and 90 % of the cells do not
+    exceed.
 
     Args:
-        dataset: Result of :func:`~cdsm.sweep` with the output ``tip_position``. Use ``sel`` if it
-            has more than 9 panels.
+        dataset: Result of :func:`~cdsm.sweep` with the output ``tip_position``, unless it is a grid
+            over two joints or of :class:`~cdsm.PlanePoses`. Use ``sel`` if it has more than 9
+            panels.
         quantity: Quantity with one number per entry: ``"softest"``, ``"stiffest"``,
             ``"isotropy"``, ``"margin"``; or ``"along"`` (a panel for each direction).
+        axs: Ordinary axes, one or more for each panel; None: a new figure.
         section: Axis, position and half thickness [m] of a slab. Only tips inside it are shown.
-        statistic: ``"median"``, ``"min"`` or ``"max"`` of the postures in a cell; None: dots where
-            the tips are in a plane or a section, else the median.
+        statistic: ``"median"``, ``"min"`` or ``"max"`` of the postures in a square cell.
+        title: Title; None: the name of the sweep and the question.
 
     Raises:
         InvalidInput: ``dataset`` is not a sweep or has too many panels or no such quantity,
@@ -107,153 +108,328 @@ def plot_map(
         CdsmError: xarray is not installed.
     """
     check_sweep(dataset)
-    remedy = "tip_position and the quantity must be among outputs of the sweep."
-    for name in ("tip_position", quantity):
-        one_of("quantity", name, [str(variable) for variable in dataset.data_vars], remedy)
-    if statistic is not None:
-        one_of("statistic", statistic, get_args(Statistic))
-    maps = list(_maps(dataset, quantity, section))
-    every = np.concatenate([tip_map.values for tip_map in maps])
-    if not len(every):
-        raise InvalidInput(
-            "section" if section is not None else "dataset",
-            "has no tip to show; widen the section, or sweep over other postures.",
-        )
-    if statistic is None and maps[0].slice:
-        statistic = "median"
-    limits = [tip_map.limits() for tip_map in maps]
-    shapes = [float(np.ptp(x) / np.ptp(y)) for x, y in limits]
-    figure, grid, size = _panels(shapes)
-    colors, extend = _colors(every)
-    for axes in grid.ravel()[len(maps) :]:
-        axes.set_axis_off()
-    for axes, tip_map, (x, y), shape in zip(grid.ravel(), maps, limits, shapes, strict=False):
-        _draw(axes, tip_map, colors, statistic)
-        axes.set(xlim=x, ylim=y, aspect="equal")
-        axes.locator_params("x", nbins=min(5, max(1, int(size * shape / _TICK))), min_n_ticks=1)
-        axes.set_title(textwrap.fill(tip_map.title, round(_CHARACTERS * (size * shape + 0.5))))
-    name = dataset[quantity].long_name.split(",")[0]
-    title = f"{dataset.attrs['title']}, {dataset.attrs['poses']}"
-    if np.isfinite(every).any():
-        sign = "; below 0: unstable" if quantity == "margin" else ""
-        unit, _ = display_of(si_of(dataset[quantity].units))
-        label = f"{f'{statistic} of a cell: ' if statistic else ''}{name} [{unit or '-'}]{sign}"
-        label = textwrap.fill(label, round(_CHARACTERS * len(grid) * (size + 0.5)))
-        look: dict[str, Any] = {"extend": extend, "extendfrac": 0.02, "aspect": 20 * len(grid)}
-        bar = figure.colorbar(colors, ax=grid, label=label, **look)
-        if isinstance(colors.norm, LogNorm):
-            bar.ax.yaxis.set_major_formatter("{x:g}")
-            bar.ax.yaxis.set_minor_formatter(NullFormatter())
+    one_of("statistic", statistic, get_args(Statistic))
+    value, poses, cases = _value(dataset, quantity)
+    name = "stiffness" if quantity == "along" else str(value.long_name).split(",")[0]
+    unit, _ = display_of(si_of(value.units))
+    label = f"{name} [{one_unit(unit) or '-'}]"
+    if len(poses) == 1 and section is None and _is_line(dataset, poses[0]):
+        return _plot_lines(dataset, value, poses[0], cases, label, axs, title)
+    if section is None and _is_grid(dataset, poses):
+        panels = list(_grid_cells(dataset, value, poses, cases))
     else:
-        known = "is finite" if np.isinf(every).any() else "exists"
-        title += f": {name} {known} at none of these tips"
-    style.legend_below(figure, grid, 2)
-    return style.titled(figure, title)
+        remedy = "tip_position must be among outputs of the sweep."
+        one_of("quantity", "tip_position", [str(v) for v in dataset.data_vars], remedy)
+        panels = list(_tip_cells(dataset, value, poses, cases, section, statistic))
+        label += f"\n{statistic} of the postures in a cell"
+    return _plot_cells(dataset, panels, label, axs, title)
 
 
-def _panels(shapes: list[float]) -> tuple[Figure, Any, float]:
-    """Return a figure, its panels, and their height [inch]; ``shapes`` are widths over heights."""
-    columns = 2 if len(shapes) == 4 else min(len(shapes), 3)
-    rows = -(-len(shapes) // columns)
-    shares = [max(shapes[column::columns]) for column in range(columns)]
-    width = style.ONE_COLUMN if columns == 1 else style.TWO_COLUMNS
-    size = min(_TALLEST, (width - _BAR - _LABELS * columns) / sum(shares))
-    height = _HEADING + rows * (size + _LABELS)
-    figure, grid = style.panels(width, height, columns, rows, width_ratios=shares)
-    figure.set_layout_engine("compressed")  # panels with equal axes stand side by side
-    return figure, grid, size
-
-
-def _maps(dataset: xarray.Dataset, quantity: str, section: Any) -> Iterator[Map]:
-    """Yield a map of each view, for each combination of the coordinates besides those of poses."""
+def _value(dataset: xarray.Dataset, quantity: str) -> tuple[xarray.DataArray, list[str], list[str]]:
+    """Return the quantity of a sweep, the dimensions of its postures, and those of its cases."""
+    remedy = "the quantity must be among outputs of the sweep."
+    one_of("quantity", quantity, [str(variable) for variable in dataset.data_vars], remedy)
     value = dataset[quantity]
-    status = dataset["status"]
-    tips = MM * dataset["tip_position"].transpose(..., "axis")
-    poses = [str(dim) for dim in tips.dims[:-1]]
     dims = [str(dim) for dim in value.dims]
-    if quantity == "status" or not {*poses} <= {*dims} <= {*status.dims, "direction"}:
+    poses = [str(dim) for dim in dataset["status"].dims if dim not in ("wrench", "minimum")]
+    allowed = {*map(str, dataset["status"].dims), "direction"}
+    if quantity == "status" or not {*poses} <= {*dims} <= allowed:
         raise InvalidInput(
             "quantity",
             f"{quantity} has the dimensions {', '.join(dims)}; a map shows one number per entry, "
             "such as softest, stiffest, isotropy, margin or along.",
         )
     cases = [dim for dim in dims if dim not in poses]
-    names = list(itertools.product(*([_name(x) for x in dataset[dim]] for dim in cases)))
-    if len(names) > _MOST_PANELS:
+    count = math.prod(dataset.sizes[dim] for dim in cases)
+    if count > _MOST_PANELS:
         listed = ", ".join(f"{dim} ({dataset.sizes[dim]})" for dim in cases)
         raise InvalidInput(
             "dataset",
-            f"makes {len(names)} panels, of {listed}; choose up to {_MOST_PANELS}, as in "
+            f"makes {count} panels, of {listed}; choose up to {_MOST_PANELS}, as in "
             f"dataset.isel({cases[0]}=[0]).",
         )
-    # a dimension that the quantity does not have cannot change its status: take index 0
-    status = status.isel({dim: 0 for dim in status.dims if dim not in dims}, drop=True)
-    points = tips.values.reshape(-1, 3)
-    known = np.isfinite(points).all(axis=1)
-    points = points[known]
-    (x, code) = (
-        array.transpose(*cases, *poses).values.reshape(len(names), -1)[:, known]
-        for array in (value, status.broadcast_like(value))
+    return value, poses, cases
+
+
+def _is_grid(dataset: xarray.Dataset, poses: list[str]) -> bool:
+    """Whether postures are a grid of two evenly numbered coordinates."""
+    return len(poses) == 2 and all(
+        dim in dataset.coords and dataset.sizes[dim] > 1 and dataset[dim].dtype.kind == "f"
+        for dim in poses
     )
-    (buckled,) = (code for code, word in status_names(dataset).items() if word == "unstable")
-    unstable = code == buckled
+
+
+def _is_line(dataset: xarray.Dataset, dim: str) -> bool:
+    return "distance" in dataset.coords or (dim != "pose" and dataset.sizes[dim] > 1)
+
+
+def _entries(
+    dataset: xarray.Dataset, value: xarray.DataArray, poses: list[str], cases: list[str]
+) -> tuple[list[dict[str, str]], Array, NDArray[np.int_]]:
+    """Return words of each case, values (cases, …poses) for people, and statuses of that shape."""
+    names: list[dict[str, str]] = []
+    labels = [[(dim, _name(x)) for x in dataset[dim]] for dim in cases]
+    for case in itertools.product(*labels):
+        names.append(dict(case))
+    status = dataset["status"]
+    # a dimension that the quantity does not have cannot change its status: take index 0
+    dims = [*map(str, value.dims)]
+    status = status.isel({dim: 0 for dim in status.dims if dim not in dims}, drop=True)
+    status = status.broadcast_like(value)
+    shape = (len(names), *(dataset.sizes[dim] for dim in poses))
+    x, code = (a.transpose(*cases, *poses).values.reshape(shape) for a in (value, status))
     _, size = display_of(si_of(value.units))
     x = x / size
-    if quantity != "margin":
-        x = np.where(unstable, np.nan, x)
-    path = "distance" in dataset.coords and poses == ["pose"]  # a joint may have this name
-    views = list(_views(points, section, path))
-    for case, values, buckles in zip(names, x, unstable, strict=True):
-        for view, normal, seen, cut in views:
-            plane = [axis for axis in range(3) if axis != normal]
-            title = ", ".join(filter(None, (*case, view)))
-            yield Map(title, plane, points[seen][:, plane], values[seen], buckles[seen], cut)
+    words = status_names(dataset)
+    codes = {word: k for k, word in words.items()}
+    if value.name != "margin":
+        x = np.where(code == codes[Status.UNSTABLE.word], np.nan, x)
+    numbers = {k: Status[word.upper()] for k, word in words.items()}
+    return names, x, np.vectorize(lambda k: int(numbers[int(k)]))(code)
 
 
 def _name(coordinate: xarray.DataArray) -> str:
-    """Write a coordinate of a case: ``minimum 20 N``."""
+    """Write a coordinate of a case: ``minimum 20 N``, ``along z``."""
     value = coordinate.item()
     unit = coordinate.attrs.get("units", "1")
     text = value if isinstance(value, str) else f"{value:g}"
-    return f"{coordinate.name} {text}{'' if unit == '1' else f' {unit}'}"
+    words = {"direction": "along", "minimum": "tensions from"}.get(
+        str(coordinate.name), str(coordinate.name)
+    )
+    return f"{words} {text}{'' if unit == '1' else f' {unit}'}"
 
 
-def _views(points: Array, section: Any, path: bool) -> Iterator[View]:
-    """Yield the view of a section or of the plane of all tips, or else three slices or views."""
+def _faults_of(values: Array, status: NDArray[np.int_]) -> dict[str, NDArray[np.bool_]]:
+    """Return where no value is, by the words for its status."""
+    missing = np.isnan(values)
+    faults: dict[str, NDArray[np.bool_]] = {}
+    for code in np.unique(status[missing]).tolist():
+        words = _FAULTS.get(Status(code), _OTHER)[0]
+        mask = missing & (status == code)
+        faults[words] = mask | faults[words] if words in faults else mask
+    return faults
 
-    def slab(axis: int, middle: float, half: float) -> View:
-        title = f"{'xyz'[axis]} = {round(middle, 1) + 0.0:.3g} ± {half:.2g} mm"
+
+def _grid_cells(
+    dataset: xarray.Dataset, value: xarray.DataArray, poses: list[str], cases: list[str]
+) -> Iterator[Cells]:
+    """Yield the cells of a grid over two joints, or of tips in a plane."""
+    names, x, status = _entries(dataset, value, poses, cases)
+    first, second = (_axis(dataset, dim) for dim in poses)
+    for case, values, code in zip(names, x, status, strict=True):
+        cells = values.T
+        yield Cells(
+            ", ".join(case.values()), first[1], second[1], cells, _faults_of(cells, code.T),
+            (first[0], second[0]), case.get("direction", ""),
+        )  # fmt: skip
+
+
+def _axis(dataset: xarray.Dataset, dim: str) -> tuple[str, Array]:
+    """Return the label of a coordinate of cells, and the edges of its cells."""
+    coordinate = dataset[dim]
+    unit, size = {"rad": ("°", math.pi / 180.0), "m": ("mm", 1e-3)}.get(
+        coordinate.attrs.get("units", "1"), ("-", 1.0)
+    )
+    middle = coordinate.values / size
+    step = np.diff(middle)
+    edges = np.concatenate(
+        [[middle[0] - step[0] / 2], middle[:-1] + step / 2, [middle[-1] + step[-1] / 2]]
+    )
+    name = dim.removeprefix("tip_") if "plane" in dataset.coords else dim
+    return f"{name} [{unit}]", edges
+
+
+def _tip_cells(
+    dataset: xarray.Dataset,
+    value: xarray.DataArray,
+    poses: list[str],
+    cases: list[str],
+    section: Any,
+    statistic: Statistic,
+) -> Iterator[Cells]:
+    """Yield the cells of tips in a plane, in a section, or of a cloud in three slices."""
+    names, x, status = _entries(dataset, value, poses, cases)
+    tips = MM * dataset["tip_position"].transpose(*poses, "axis").values.reshape(-1, 3)
+    known = np.isfinite(tips).all(axis=1)
+    tips = tips[known]
+    x = x.reshape(len(names), -1)[:, known]
+    status = status.reshape(len(names), -1)[:, known]
+    views = list(_views(tips, section))
+    if not any(inside.any() for _, _, inside in views):
+        problem = "has no tip to show; widen the section, or sweep over other postures."
+        raise InvalidInput("section" if section is not None else "dataset", problem)
+    for case, values, code in zip(names, x, status, strict=True):
+        for view, normal, inside in views:
+            plane = [axis for axis in range(3) if axis != normal]
+            points = tips[inside][:, plane]
+            edges = _edges(points)
+            cells = bin_values(points, values[inside], edges, statistic)
+            faults = _binned_faults(points, values[inside], code[inside], edges, cells)
+            holds = int(np.isfinite(values[inside]).sum())
+            heading = f"{holds} of {inside.sum()} postures hold"
+            labels = (f"{XYZ[plane[0]]} [mm]", f"{XYZ[plane[1]]} [mm]")
+            title = ", ".join(filter(None, (*case.values(), view)))
+            shared = case.get("direction", "")
+            yield Cells(title, *edges, cells, faults, labels, shared, heading)
+
+
+def _views(points: Array, section: Any) -> Iterator[tuple[str, int, NDArray[np.bool_]]]:
+    """Yield the view of a section or of the plane of all tips, or else three slices."""
+
+    def slab(axis: int, middle: float, half: float) -> tuple[str, int, NDArray[np.bool_]]:
+        title = f"{XYZ[axis]} = {round(middle, 1) + 0.0:.3g} ± {half:.2g} mm"
         inside = abs(points[:, axis] - middle) <= half
-        return title.replace(" ", "\xa0"), axis, inside, section is None  # no line break
+        return title.replace(" ", "\xa0"), axis, inside  # no line break
 
     every = np.full(len(points), True)
-    extent = np.ptp([*points, np.zeros(3)], axis=0)
-    flat = np.ptp(points, axis=0) <= _FLAT * extent.max()
+    extent = np.ptp(np.vstack([points, np.zeros(3)]), axis=0)
+    flat = np.ptp(points, axis=0) <= _FLAT * extent.max() if len(points) else np.zeros(3, bool)
     if section is not None:
         if not isinstance(section, (tuple, list)) or len(section) != 3:
             problem = f"{section!r} given; an axis, its place and the half thickness [m] needed."
             raise InvalidInput("section", problem)
-        axis = "xyz".index(one_of("axis", section[0], tuple("xyz")))
+        axis = XYZ.index(one_of("axis", section[0], XYZ))
         yield slab(axis, *(MM * scalar("section", number) for number in section[1:]))
     elif flat.any():
         axis = int(np.where(flat, extent, np.inf).argmin())
         off = extent[axis] > _FLAT * extent.max()  # from the base, which is at the origin
-        title = f"{'xyz'[axis]} = {points[0, axis]:.3g} mm".replace(" ", "\xa0")
-        yield title if off else "", axis, every, False
+        title = f"{XYZ[axis]} = {points[0, axis]:.3g} mm".replace(" ", "\xa0")
+        yield title if off else "", axis, every
     else:
         for axis in (1, 2, 0):
-            x = points[:, axis]
-            seen = f"seen along {'xyz'[axis]}", axis, every, False
-            yield seen if path else slab(axis, float(np.median(x)), _SLICE * float(np.ptp(x)))
+            middle = float(np.median(points[:, axis])) if len(points) else 0.0
+            half = _SLICE * float(np.ptp(points[:, axis])) if len(points) else 0.0
+            yield slab(axis, middle, half)
 
 
-def _colors(values: Array) -> tuple[ScalarMappable, str]:
-    """Return a colour scale for ``values`` without outliers, and the ends beyond which they are."""
+def _edges(points: Array) -> tuple[Array, Array]:
+    """Return edges of square cells around points (N, 2), of a size that follows from N."""
+    if not len(points):
+        return np.array([0.0, 1.0]), np.array([0.0, 1.0])
+    extent = np.ptp(points, axis=0)
+    longest = float(extent.max()) or 1.0
+    area = float(np.prod(np.maximum(extent, 1e-3 * longest)))
+    size = math.sqrt(area * _POSTURES / len(points))
+    size = float(np.clip(size, longest / _CELLS[1], longest / _CELLS[0])) * (1.0 + _EDGE)
+    count = np.maximum(np.ceil(extent / size - _EDGE), 1.0).astype(int)
+    low = points.min(axis=0) + extent / 2.0 - size * count / 2.0
+    x, y = (low[i] + size * np.arange(count[i] + 1) for i in range(2))
+    return x, y
+
+
+def bin_values(
+    points: Array,
+    values: Array,
+    edges: tuple[Array, Array],
+    statistic: Statistic | Literal["count"],
+) -> Array:
+    """Return a statistic (n, m) of values (N,) at points (N, 2) in cells; NaN where there is none.
+
+    Infinite values count as the largest.
+    """
+    from scipy.stats import binned_statistic_2d  # here, because it imports slowly
+
+    x, y = edges
+    known = ~np.isnan(values)
+    cells = np.full((len(x) - 1, len(y) - 1), 0.0 if statistic == "count" else np.nan)
+    if known.any():
+        finite = np.minimum(values[known], _HUGE)
+        cells = binned_statistic_2d(*points[known].T, finite, statistic, [x, y]).statistic
+    return np.asarray(np.where(cells >= _HUGE / 2.0, np.inf, cells)).T
+
+
+def _binned_faults(
+    points: Array,
+    values: Array,
+    status: NDArray[np.int_],
+    edges: tuple[Array, Array],
+    cells: Array,
+) -> dict[str, NDArray[np.bool_]]:
+    """Return the cells without a value, each by the words for most of its entries."""
+    faults = _faults_of(values, status)
+    if not faults:
+        return {}
+    zeros = np.zeros(len(points))
+    counts = np.array(
+        [bin_values(points[mask], zeros[mask], edges, "count") for mask in faults.values()]
+    )
+    empty = np.isnan(cells) & (counts.max(axis=0) > 0)
+    most = counts.argmax(axis=0)
+    return {words: empty & (most == k) for k, words in enumerate(faults)}
+
+
+def _plot_cells(
+    dataset: xarray.Dataset, cells: list[Cells], label: str, axs: Any, title: str | None
+) -> Panels:
+    """Draw the panels, a colour bar for each scale, and what the hatches mean."""
+    columns = 2 if len(cells) == 4 else min(len(cells), 3)
+    rows = -(-len(cells) // columns)
+    width = style.ONE_COLUMN if columns == 1 else style.TWO_COLUMNS
+    scales = {
+        name: _colors([panel.values for panel in cells if panel.scale == name])
+        for name in dict.fromkeys(panel.scale for panel in cells)
+    }
+    shape = max(float(np.ptp(panel.y) / np.ptp(panel.x)) for panel in cells)
+    room = (width / columns - 0.75) * float(np.clip(shape, 0.4, 1.3))
+    bars = rows if len(scales) > 1 else 1
+    height = 0.75 + rows * (room + 0.75) + 0.55 * bars
+    chosen = axs
+    if axs is None:
+        shapes = [float(np.ptp(panel.x) / np.ptp(panel.y)) for panel in cells]
+        ratios = np.clip([max(shapes[k::columns]) for k in range(columns)], 0.4, 2.5)
+        options: dict[str, Any] = {"width_ratios": ratios.tolist()}
+        chosen = style.panels(None, columns, rows, height=height, width=width, **options)
+        # without it, panels of equal scales would stand far from each other
+        style.figure_of(chosen).set_layout_engine("compressed", h_pad=0.07)
+        for ax in chosen[len(cells) :]:
+            ax.remove()
+    panels = style.panels(chosen[: len(cells)] if axs is None else axs, len(cells), height=height)
+    for ax, panel in zip(panels, cells, strict=True):
+        _draw(ax, panel, scales[panel.scale][0])
+    for scale, (colors, extend) in scales.items():
+        users = [ax for ax, panel in zip(panels, cells, strict=True) if panel.scale == scale]
+        text = label.replace(" [", f" {scale} [", 1) if scale else label
+        if any(np.isfinite(panel.values).any() for panel in cells if panel.scale == scale):
+            color_bar_below(users, colors, text, extend)
+    _legend_faults(panels, cells, axs)
+    finite = [np.isfinite(panel.values).any() for panel in cells]
+    about = f"{dataset.attrs['title'].removeprefix('stiffness sweep of ')}"
+    question = f"{about}: where is it stiff, where does it hold? {_sentence(dataset)}"
+    if not any(finite):
+        known = "is finite" if any(np.isinf(panel.values).any() for panel in cells) else "exists"
+        question = f"{about}: {label.split(' [')[0]} {known} at none of these postures"
+    style.set_heading(panels, axs, title, question)
+    return panels
+
+
+def _sentence(dataset: xarray.Dataset) -> str:
+    """Return how the postures were chosen, and what part of the entries holds."""
+    codes = {word: code for code, word in status_names(dataset).items()}
+    status = dataset["status"].values
+    reached = status != codes.get(Status.OUT_OF_REACH.word, -1)
+    holds = np.isin(status, [codes["ok"], codes["immobile"]])
+    part = 100.0 * holds.sum() / max(int(reached.sum()), 1)
+    poses = str(dataset.attrs["poses"])
+    tension = "" if "minimum" in dataset.dims else f", tensions from {_least(dataset)} N"
+    return f"{poses[:1].upper()}{poses[1:]}{tension}; {part:.3g} % hold"
+
+
+def _least(dataset: xarray.Dataset) -> str:
+    """Return the least tension that held, as text."""
+    for name in ("minimum_held", "minimum"):
+        if name in dataset.coords:
+            return f"{float(dataset[name].min()):g}"
+    return "0"
+
+
+def _colors(arrays: Sequence[Array]) -> tuple[ScalarMappable, str]:
+    """Return a colour scale for values without outliers, and the ends beyond which they are."""
+    values = np.concatenate([array.ravel() for array in arrays])
     finite = values[np.isfinite(values)] if np.isfinite(values).any() else np.array([0.0, 1.0])
     low, high = np.percentile(finite, _ROBUST)
     scale = Normalize
     name = style.COLOR_MAP
-    if finite.min() < 0.0 < finite.max():  # a margin: colours show its sign, zero is in the middle
+    if finite.min() < 0.0 < finite.max():  # colours show the sign, zero is in the middle
         high = max(-low, high)
         name = "PuOr"
         low = -high
@@ -264,31 +440,143 @@ def _colors(values: Array) -> tuple[ScalarMappable, str]:
         high = high + 0.05 * abs(high)
     beyond = bool((finite < low).any()), bool((values > high).any())
     extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[beyond]
-    return ScalarMappable(scale(low, high), colormaps[name]), extend
+    return ScalarMappable(scale(float(low), float(high)), colormaps[name]), extend
 
 
-def _draw(axes: Any, shown: Map, colors: ScalarMappable, statistic: Statistic | None) -> None:
-    points = shown.points  # inf would not be drawn
-    values = np.minimum(shown.values, _HUGE)
-    known = ~np.isnan(values)
-    look: dict[str, Any] = {"norm": colors.norm, "cmap": colors.cmap}
-    for chosen, mark in ((~shown.unstable & ~known, _NONE), (shown.unstable & ~known, _UNSTABLE)):
-        if chosen.any():
-            axes.scatter(*points[chosen].T, **mark)
-    if statistic is None or not known.any():
-        axes.scatter(*points[known].T, c=values[known], s=8.0, linewidths=0.0, **look)
+def _draw(ax: Axes, panel: Cells, colors: ScalarMappable) -> None:
+    values = np.ma.masked_invalid(np.minimum(panel.values, _HUGE))
+    look: dict[str, Any] = {"norm": colors.norm, "cmap": colors.cmap, "rasterized": True}
+    ax.pcolormesh(panel.x, panel.y, values, gid="cells", zorder=1, **look)
+    for words, mask in panel.faults.items():
+        _hatch(ax, panel, words, mask)
+    ax.set(xlabel=panel.labels[0], ylabel=panel.labels[1], facecolor="0.97")
+    ax.set(xlim=(panel.x[0], panel.x[-1]), ylim=(panel.y[0], panel.y[-1]), aspect="equal")
+    if colors.cmap.name == "PuOr":  # the middle of the scale is white
+        ax.set_facecolor("0.88")
+    ax.grid(visible=False)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(MaxNLocator(4, min_n_ticks=3, steps=[1, 2, 5, 10]))
+    lines = [panel.title, panel.heading, _quantiles(panel.values)]
+    ax.set_title("\n".join(filter(None, lines)), fontsize=style.NOTE_SIZE, linespacing=1.25)
+
+
+def _hatch(ax: Axes, panel: Cells, words: str, mask: NDArray[np.bool_]) -> None:
+    """Fill cells without a value with the hatch of these words."""
+    if not mask.any():
+        return
+    _, face, hatch, edge = _look_of(words)
+    rows, columns = np.nonzero(mask)
+    corners = [
+        [
+            (panel.x[c], panel.y[r]),
+            (panel.x[c + 1], panel.y[r]),
+            (panel.x[c + 1], panel.y[r + 1]),
+            (panel.x[c], panel.y[r + 1]),
+        ]
+        for r, c in zip(rows, columns, strict=True)
+    ]
+    plain = PolyCollection(corners, facecolor=face, edgecolor="none", zorder=1.5)
+    plain.set_gid(f"fault:{words}")
+    ax.add_collection(plain)
+    if hatch:
+        look: dict[str, Any] = {"facecolor": "none", "edgecolor": edge, "linewidth": 0.0}
+        ax.add_collection(PolyCollection(corners, hatch=hatch, zorder=1.6, **look))
+
+
+def _look_of(words: str) -> tuple[str, str, str, str]:
+    return next((look for look in _FAULTS.values() if look[0] == words), _OTHER)
+
+
+def _quantiles(values: Array) -> str:
+    """Return the values that 10, 50 and 90 % of the cells do not exceed, as text."""
+    known = values[~np.isnan(values)]
+    if not known.size:
+        return "no value"
+    # an infinite value counts as largest
+    marks = np.quantile(known, (0.1, 0.5, 0.9), method="inverted_cdf")
+    return "10/50/90 %: " + " / ".join(f"{x:.3g}" for x in marks)
+
+
+def color_bar_below(axs: Sequence[Axes], colors: ScalarMappable, label: str, extend: str) -> None:
+    """Draw a slim colour bar below panels, with three numbers or more."""
+    figure = style.figure_of(axs[0])
+    place: dict[str, Any] = {"orientation": "horizontal", "fraction": 0.06, "pad": 0.03}
+    place |= {"aspect": 26 * min(len(axs), 2), "shrink": 1.0 if len(axs) < 3 else 0.6}
+    bar = figure.colorbar(colors, ax=list(axs), extend=extend, extendfrac=0.03, **place)
+    bar.set_label(label, labelpad=2)
+    bar.outline.set_linewidth(0.4)
+    bar.ax.tick_params(length=2, width=0.5, labelsize=7)
+    axis = bar.ax.xaxis
+    if isinstance(colors.norm, LogNorm):
+        low, high = colors.get_clim()
+        places = np.zeros(0)
+        for parts in ((1.0,), (1.0, 3.0), (1.0, 2.0, 5.0), (1, 1.5, 2, 3, 4, 5, 6, 8)):
+            marks = np.asarray(LogLocator(10.0, parts).tick_values(low or 1.0, high or 1.0))
+            places = marks[(marks >= (low or 0.0)) & (marks <= (high or 0.0))]
+            if places.size >= 3:
+                break
+        bar.set_ticks(places.tolist(), labels=[f"{x:g}" for x in places])
+        axis.set_minor_locator(NullLocator())
     else:
-        from scipy.stats import binned_statistic_2d  # here, because it imports slowly
+        bar.locator = MaxNLocator(4, min_n_ticks=3)
+        bar.update_ticks()
+    axis.set_minor_formatter(NullFormatter())
+    style.keep_ticks(bar.ax)
 
-        middle, extent = shown.box()
-        size = (1.0 + _FLAT) * extent.max() / _CELLS
-        count = np.maximum(np.ceil(extent / size), 1.0)
-        ends = np.transpose([middle - size * count / 2.0, middle + size * count / 2.0])
-        cells, *edges, _ = binned_statistic_2d(
-            *points[known].T, values[known], statistic, count.astype(int), ends
+
+def _legend_faults(panels: Panels, cells: list[Cells], axs_of_caller: object) -> None:
+    """Draw what the hatches mean: below a figure of this library, else in the last panel."""
+    used = {words for panel in cells for words, mask in panel.faults.items() if mask.any()}
+    looks = [look for look in (*_FAULTS.values(), _OTHER) if look[0] in used]
+    keys = []
+    for words, face, hatch, edge in looks:
+        line: dict[str, Any] = {"ec": edge, "lw": 0.0} if hatch else {"ec": "0.8", "lw": 0.5}
+        keys.append(Patch(fc=face, hatch=hatch, label=words, **line))
+    if not keys:
+        return
+    if axs_of_caller is None:
+        style.figure_of(panels).legend(
+            handles=keys, loc="outside lower left", ncols=4, handleheight=1.1
         )
-        axes.pcolormesh(*edges, np.ma.masked_invalid(cells.T), zorder=2, **look)
-    if look["cmap"].name == "PuOr":  # the middle of the scale is white
-        axes.set_facecolor("0.88")
-    for letter, axis in zip("xy", shown.plane, strict=True):
-        getattr(axes, f"set_{letter}label")(f"{'xyz'[axis]} [mm]")
+    else:
+        panels[-1].legend(handles=keys, loc="upper right", frameon=True, handleheight=1.1)
+
+
+def _plot_lines(
+    dataset: xarray.Dataset,
+    value: xarray.DataArray,
+    dim: str,
+    cases: list[str],
+    label: str,
+    axs: Any,
+    title: str | None,
+) -> Panels:
+    """Draw a quantity over one joint, or over the way along a path, with a line for each case."""
+    names, x, _ = _entries(dataset, value, [dim], cases)
+    coordinate = dataset["distance" if "distance" in dataset.coords else dim]
+    unit, size = {"rad": ("°", math.pi / 180.0), "m": ("mm", 1e-3)}.get(
+        coordinate.attrs.get("units", "1"), ("-", 1.0)
+    )
+    panels = style.panels(axs, 1, height=2.4, width=style.ONE_COLUMN)
+    ax = panels[0]
+    place = coordinate.values / size
+    ends = []
+    for look, case, values in zip(style.line_looks([""] * len(names)), names, x, strict=True):
+        words = ", ".join(case.values())
+        ax.plot(place, values, gid=f"line:{words}", **look)
+        known = np.flatnonzero(np.isfinite(values))[-1:]
+        ends += [(float(values[k]), words, str(look["color"])) for k in known]
+    missing = np.isnan(x).all(axis=0)
+    if missing.any():
+        for k in np.flatnonzero(missing).tolist():
+            low = place[max(k - 1, 0)] / 2.0 + place[k] / 2.0
+            high = place[min(k + 1, len(place) - 1)] / 2.0 + place[k] / 2.0
+            ax.axvspan(low, high, fc="0.9", lw=0.0, zorder=0.4, gid="no value")
+    ax.set_ylim(ax.get_ylim())
+    ax.set_xlim(place.min(), place.max())
+    style.name_lines(ax, float(place.max()), ends)
+    along = "way along the path" if coordinate.name == "distance" else str(coordinate.name)
+    ax.set(xlabel=f"{along} [{unit}]", ylabel=textwrap.fill(label, 30))
+    about = str(dataset.attrs["title"]).removeprefix("stiffness sweep of ")
+    style.set_heading(panels, axs, title, f"{about}: how stiff is it on its way?")
+    return panels

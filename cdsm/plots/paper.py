@@ -8,17 +8,18 @@ computed from EA/L with the stretched length L, as in the paper, and from EA/l_0
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
 from cdsm.plots import style
-from cdsm.plots.arm import draw_arm, frame_arms
+from cdsm.plots.arm import draw_arm
 from cdsm.plots.measured import shade_stages
-from cdsm.plots.style import KN, MM, N_PER_MM
+from cdsm.plots.projection import VIEW, Drawing
+from cdsm.plots.style import KN, MM, N_PER_MM, Panels
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
@@ -46,17 +47,21 @@ _STAGES: Final = (
 
 
 @style.styled
-def plot_paper(result: paper.Figure) -> Figure:
+def plot_paper(
+    result: paper.Figure, axs: Panels | Sequence[Axes] | None = None, *, title: str | None = None
+) -> Panels:
     """Plot the curves of one recomputed figure, with the numbers that the paper prints."""
-    figure = _DRAWN[result.name](result)
-    return style.titled(figure, result.title)
+    panels = _DRAWN[result.name](result, axs)
+    style.set_heading(panels, axs, title, result.title)
+    return panels
 
 
 def _multiples(
-    result: paper.StiffnessFigure, height: float, rows: list[Row], **shared: Any
-) -> tuple[Figure, Any]:
+    result: paper.StiffnessFigure, axs: Any, height: float, rows: list[Row], **shared: Any
+) -> Panels:
     """Draw rows of panels x, y and z; each row has a label, and lines of x (N,), y (N, 3), look."""
-    figure, grid = style.panels(style.TWO_COLUMNS, height, 3, len(rows), sharex=True, **shared)
+    panels = style.panels(axs, 3, len(rows), height=height, sharex=True, **shared)
+    grid = panels.reshape(-1, 3)
     for panels, (label, lines) in zip(grid, rows, strict=True):
         panels[0].set_ylabel(label)
         for x, y, look in lines:
@@ -65,10 +70,10 @@ def _multiples(
     for i, axis in enumerate("xyz"):
         grid[0, i].set_title(axis)
         grid[-1, i].set_xlabel(_SWEPT[result.swept])
-    return figure, grid
+    return grid
 
 
-def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
+def _plot_moduli(result: paper.StiffnessFigure, axs: Any) -> Panels:
     """Plot Fig. 3; its last row is passive part minus total stiffness, over the total stiffness."""
     ratio, (limit, *_) = (np.array(result.claims[k].paper) for k in (0, 1))
     looks: Any = {"color": style.BLUE, "zorder": 3}, {"color": style.ORANGE, **_WIDE}
@@ -91,17 +96,17 @@ def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
     diamond = {**_DOT, "marker": "D", "mfc": "none", "ms": 6.0}
     label = "paper: proportional, twice at 320 GPa"
     rows[0][1].append((x[-1:], doubled, {**diamond, "label": label}))
-    figure, grid = _multiples(result, 5.4, [*rows, ("passive less\ntotal [%]", differences)])
+    grid = _multiples(result, axs, 5.4, [*rows, ("passive less\ntotal [%]", differences)])
     for axes in grid[:2].flat:
         axes.set_ylim(0.0, 1.05 * axes.get_ylim()[1])  # room for the diamond
     for axes in grid[2]:
         axes.axhspan(-limit, limit, color="0.9", lw=0, label="paper: within 1.5 %")
         axes.set_ylim(-1.2 * limit, 1.2 * limit)
-    style.legend_below(figure, grid[:, 0], 3, title=_NOTE)
-    return figure
+    style.legend_below(grid[:, 0], 3, axs, title=_NOTE)
+    return grid.ravel()
 
 
-def _plot_directions(result: paper.StiffnessFigure) -> Figure:
+def _plot_directions(result: paper.StiffnessFigure, axs: Any) -> Panels:
     """Plot Fig. 6: K_R and the stiffness for a hung weight, against tension."""
     (curve,) = result.curves
     (original,) = result.original
@@ -118,16 +123,16 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
     times = ", ".join(f"+{change:g}" for change in stated)
     label = f"paper: {times} times the first computed value"
     rows[0][1].append((curve.tension[-1:, 1], end, {**_DOT, "label": label}))
-    figure, grid = _multiples(result, 4.4, rows)
+    grid = _multiples(result, axs, 4.4, rows)
     for name, panels in zip(_DEFINITIONS, grid, strict=True):
         _draw_bars(panels, curve, getattr(curve, name))
     for axes in grid.flat:
         axes.set_ylim(bottom=0.0)
-    style.legend_below(figure, grid[0, 0], 3, title=_NOTE)
-    return figure
+    style.legend_below(grid[0, 0], 3, axs, title=_NOTE)
+    return grid.ravel()
 
 
-def _plot_changes(result: paper.StiffnessFigure) -> Figure:
+def _plot_changes(result: paper.StiffnessFigure, axs: Any) -> Panels:
     """Plot Figs. 4 and 7: active part of K_R, and changes [%] of both stiffnesses, over tension."""
     first = result.curves[0]
     shades = (style.BLUE, style.ORANGE)
@@ -146,17 +151,17 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
         rows.append((f"change, {definition} [%]", lines))
     stated = np.array([result.claims[0].paper])
     rows[1][1].append((x[-1:], stated, {**_DOT, "label": "paper, at the end"}))
-    figure, grid = _multiples(result, 6.2, rows, sharey="row")
+    grid = _multiples(result, axs, 6.2, rows, sharey="row")
     _draw_bars(grid[0], first, active)
     for axes in grid[1:].flat:
         axes.axhline(0.0, color="0.2", linewidth=0.6)
-    style.legend_below(figure, grid[:2, 0], 2, title=_NOTE)
-    return figure
+    style.legend_below(grid[:2, 0], 2, axs, title=_NOTE)
+    return grid.ravel()
 
 
-def _plot_lead(result: paper.LeadFigure) -> Figure:
+def _plot_lead(result: paper.LeadFigure, axs: Any) -> Panels:
     """Plot the change of K_R, and of the stiffness for a hung weight, against the lead."""
-    figure, (pair,) = style.panels(style.TWO_COLUMNS, 3.4, 2, sharey=True)
+    pair = style.panels(axs, 2, height=3.4, sharey=True)
     cases = (result.stretched, "stretched", "-"), (result.original, "unstrained", "--")
     for row, (axes, definition) in enumerate(zip(pair, _DEFINITIONS.values(), strict=True)):
         for i, color in enumerate(style.COLORS[:3]):
@@ -170,24 +175,23 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
         axes.set_xlabel("lead of all cables [mm]")
         axes.set_title(definition.replace("\n", ", "))
     pair[0].set_ylabel("change of stiffness [%]")
-    style.legend_below(figure, pair[0], 3, title=_NOTE)
-    return figure
+    style.legend_below(pair[0], 3, axs, title=_NOTE)
+    return pair
 
 
-def _plot_postures(result: paper.StiffnessFigure) -> Figure:
+def _plot_postures(result: paper.StiffnessFigure, axs: Any) -> Panels:
     """Plot Fig. 8: for each posture, a picture of the arm, K_R and stiffness for a hung weight."""
-    figure = Figure(figsize=(style.TWO_COLUMNS, 6.4))
-    grid = figure.add_gridspec(3, 3, height_ratios=(1.1, 1.0, 1.0))
+    panels = style.panels(axs, 3, 3, height=6.4, height_ratios=(1.1, 1.0, 1.0))
+    grid = panels.reshape(3, 3)
     for column, pose in enumerate(result.postures):
         curve = result.curves[column]
         original = result.original[column]
-        picture: Any = figure.add_subplot(grid[0, column], projection="3d")
-        draw_arm(picture, pose)
-        picture.set_box_aspect(frame_arms(picture), zoom=1.2)
-        picture.set_axis_off()
-        picture.set_title(curve.label)
+        drawing = Drawing(grid[0, column], VIEW, pose.arm.length)
+        draw_arm(drawing, pose)
+        drawing.finish(triad=column == 0)
+        grid[0, column].set_title(curve.label)
         for row, (name, definition) in enumerate(_DEFINITIONS.items(), start=1):
-            axes: Any = figure.add_subplot(grid[row, column])
+            axes = grid[row, column]
             for i, color in enumerate(style.COLORS[:3]):
                 for one, look in ((original, _WIDE), (curve, {"ls": style.STYLES[i]})):
                     values = N_PER_MM * getattr(one, name)[:, i]
@@ -201,13 +205,14 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
                 axes.set_ylabel(f"{definition} [N/mm]")
         axes.set_xlabel(_SWEPT[result.swept])
     note = f"{_NOTE}\nthe paper prints no numbers here: a steep rise, then a slight decrease"
-    style.legend_below(figure, axes, 3, title=note)  # the last panel: all have the same lines
-    return figure
+    style.legend_below(axes, 3, axs, title=note)  # the last panel: all have the same lines
+    return panels
 
 
-def _plot_strand(result: paper.StrandFigure) -> Figure:
+def _plot_strand(result: paper.StrandFigure, axs: Any) -> Panels:
     """Plot Fig. 5: force against displacement (a) and rigidity against tension (b)."""
-    figure, ((left, right),) = style.panels(style.TWO_COLUMNS, 3.4, 2)
+    panels = style.panels(axs, 2, height=3.4)
+    left, right = panels
     left.plot(MM * result.displacement, result.tension)
     shade_stages(left, _STAGES, "y")
     left.set(xlabel=f"stretch of a {MM * result.gauge_length:g} mm wire [mm]", ylabel="force [N]")
@@ -230,13 +235,13 @@ def _plot_strand(result: paper.StrandFigure) -> Figure:
     right.set_ylim(-5.0, 1.2 * KN * result.tangent.max())  # the printed law falls far below
     right.set(xlabel="tension [N]", ylabel="rigidity EA [kN]", title="(b)")
     right.set_xlim(0.0, _STAGES[-1][-1])
-    style.legend_below(figure, right, 4)
-    return figure
+    style.legend_below(right, 4, axs)
+    return panels
 
 
-def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
+def _plot_experiment(result: paper.ExperimentFigure, axs: Any) -> Panels:
     """Plot Fig. 10, 12 or 13, a panel per trace: computed values as a line, the paper's as dots."""
-    figure, grid = style.panels(style.TWO_COLUMNS, 2.8, len(result.traces), sharex=True)
+    panels = style.panels(axs, len(result.traces), height=2.8, sharex=True)
     across = 1.0  # x, y and z, or y alone
     scale = N_PER_MM
     colors = style.COLORS
@@ -249,15 +254,15 @@ def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
         scale = 1.0
         y = "stiffness in y\nover the first [-]"
         colors = (style.PURPLE,) * 7
-    for axes, trace, color in zip(grid[0], result.traces, colors, strict=False):
+    for axes, trace, color in zip(panels, result.traces, colors, strict=False):
         axes.plot(across * trace.swept, scale * trace.computed, color=color, label="computed")
         axes.plot(across * trace.paper_at, scale * trace.paper, "ko", label="paper")
-        axes.set(title=textwrap.fill(trace.label, 110 // len(grid[0])), xlabel=x)
+        axes.set(title=textwrap.fill(trace.label, 110 // len(panels)), xlabel=x)
         axes.set_ylim(bottom=0.0)
-    grid[0, 0].set_ylabel(y)
+    panels[0].set_ylabel(y)
     note = "the prototype was fitted to come near the paper's numbers (black)"
-    style.legend_below(figure, grid[0, 0], 2, title=note)
-    return figure
+    style.legend_below(panels[0], 2, axs, title=note)
+    return panels
 
 
 def _named(curve: paper.Curve, look: dict[str, Any], before: str = "") -> dict[str, Any]:
@@ -274,7 +279,7 @@ def _draw_bars(panels: Any, curve: paper.Curve, values: Array) -> None:
         axes.errorbar(mean, y, xerr=[mean - low, high - mean], label=label, **look)
 
 
-_DRAWN: Final[dict[str, Callable[[Any], Figure]]] = {
+_DRAWN: Final[dict[str, Callable[[Any, Any], Panels]]] = {
     "fig3": _plot_moduli,
     "fig4": _plot_changes,
     "fig5": _plot_strand,

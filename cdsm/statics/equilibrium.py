@@ -33,7 +33,7 @@ from cdsm.support.values import Array, draw, frozen
 from cdsm.tension import Tension
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
     from cdsm.stiffness_matrix import Report
 
@@ -276,9 +276,13 @@ class Equilibrium(Result):
         texts = [f"{k:.4g}" if k < _LOCKED * least else "locked" for k in values]
         return f"({', '.join(texts)})"
 
-    def plot(self) -> Figure:
-        """Plot the arm in mm at the reference (grey) and at the equilibrium."""
-        return draw("plot_path", [self.reference, self.pose])
+    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """Plot the arm in mm, with tensions, compliance, load, and its reference if that is near.
+
+        Other options are those of :func:`cdsm.plots.plot_arm`. Returns the axes.
+        """
+        axes: Axes = draw("plot_arm", self, None, None, ax, **options)
+        return axes
 
     def __str__(self) -> str:
         arm = self.pose.arm

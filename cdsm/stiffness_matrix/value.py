@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, Literal, final
+from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from cdsm.tension import Tension
 from cdsm.terms import CABLE_TERMS, required_torque
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 FrictionState = Literal["frictionless", "stuck", "sliding"]
 Joints = slice | NDArray[np.intp]
@@ -400,9 +400,12 @@ class Stiffness(Result):
             raise InvalidInput("stiffness", f"cables are {self.friction}; give a frictionless K.")
         return self
 
-    def plot(self) -> Figure:
-        """Plot the arm in mm, coloured by distributed tension; if stable, its compliance too."""
-        return self.posture.plot(self.distribution, self)
+    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """Plot the arm in mm, coloured by tension; if stable, its compliance too.
+
+        Other options are those of :func:`cdsm.plots.plot_arm`. Returns the axes.
+        """
+        return self.posture.plot(self.tension, self, ax, **options)
 
     def to_dict(self) -> dict[str, object]:
         """Return the stiffness in SI for JSON, units in the keys; None for what does not exist."""

@@ -6,13 +6,10 @@ import html
 from collections.abc import Iterator
 from dataclasses import fields
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -42,25 +39,27 @@ class Printed:
         return f"<pre>{html.escape(str(self))}</pre>"
 
 
-def draw(function: str, *values: object) -> Figure:
+def draw(function: str, *values: object, **options: Any) -> Any:
     """Draw ``values`` by a function of :mod:`cdsm.plots`, a chapter above that knows all others."""
-    figure: Figure = getattr(import_module("cdsm.plots"), function)(*values)
-    return figure
+    return getattr(import_module("cdsm.plots"), function)(*values, **options)
 
 
 class Plotted:
-    """Base class of values with a figure."""
+    """Base class of values with a picture."""
 
     _figure: ClassVar[str]
     """Name of the function of :mod:`cdsm.plots` that draws it."""
 
-    def plot(self) -> Figure:
-        """Plot this value as a new figure.
+    def plot(self, ax: Any = None, **options: Any) -> Any:
+        """Plot this value, and return the axes: an array of them if there are several panels.
 
-        What it shows, stands at the function of :mod:`cdsm.plots` for its class, such as
-        :func:`~cdsm.plots.plot_stiffness_range`.
+        Args:
+            ax: Axes of matplotlib to draw on, or several for a picture of several panels; None: a
+                new figure, which is ``ax.figure`` of the result.
+            **options: Other options of the function of :mod:`cdsm.plots` for this class, such as
+                :func:`~cdsm.plots.plot_stiffness_range`. What it shows stands there.
         """
-        return draw(self._figure, self)
+        return draw(self._figure, self, ax, **options)
 
 
 class IndexedByName:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
@@ -17,7 +17,7 @@ from cdsm.status import Status
 from cdsm.support.format import aligned
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, instance, one_of, wrench_vector
-from cdsm.support.values import Array, IndexedByName, frozen
+from cdsm.support.values import Array, IndexedByName, draw, frozen
 from cdsm.tension.bounds import Bounds, bounds_at
 from cdsm.tension.infeasibility import infeasible
 from cdsm.tension.least_tensions import least_tensions
@@ -25,7 +25,7 @@ from cdsm.tension.solvers import DEFAULT_SOLVER, OPTIMALITY, nondimensional
 from cdsm.terms import required_torque
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 
 @final
@@ -103,9 +103,13 @@ class Tension(Result, IndexedByName):
         tight = distance <= OPTIMALITY * self.values.max(initial=0.0)
         return tuple(self.keys()[c] for c in np.flatnonzero(tight))
 
-    def plot(self) -> Figure:
-        """Plot the arm in mm, its cables coloured by their tension [N]."""
-        return self.posture.plot(self)
+    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """Plot the tension [N] of each cable as a bar, with its bounds, and return the axes.
+
+        Other options are those of :func:`cdsm.plots.plot_tensions`. ``pose.plot(F)`` draws the arm.
+        """
+        axes: Axes = draw("plot_tensions", self, ax, **options)
+        return axes
 
     def __str__(self) -> str:
         rows = aligned([("cable", "tension [N]"), *((c, f"{self[c]:.3f}") for c in self)])

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from cdsm.errors import GeometryError
 from cdsm.manipulator import Manipulator
-from cdsm.plots.arm import ELLIPSOID_GRID
 from cdsm.status import Status
 from cdsm.support.values import Array
+from cdsm.view.ellipsoid import ELLIPSOID_GRID
 from cdsm.view.state import GREY, Color, Shown
 
 if TYPE_CHECKING:

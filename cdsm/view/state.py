@@ -14,7 +14,7 @@ import cdsm
 from cdsm.errors import CdsmError, listed
 from cdsm.friction.capstan import can_stick
 from cdsm.manipulator import Manipulator
-from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
+from cdsm.plots.style import tension_colors
 from cdsm.posture import Posture
 from cdsm.report.remedies import find_remedies
 from cdsm.statics.equilibrium import Equilibrium
@@ -25,6 +25,7 @@ from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import plural
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, distribute_tension
+from cdsm.view.ellipsoid import Ellipsoid, ellipsoid
 
 Color = tuple[int, int, int]
 
@@ -116,7 +117,7 @@ class Shown:
 
     @cached_property
     def ellipsoid(self) -> Ellipsoid | None:
-        """Ellipsoid of displacements, as in :func:`cdsm.plots.plot_arm`; None if not stable."""
+        """Ellipsoid of displacements of the tip; None if not stable."""
         pose = self.posture
         source = self.source
         if pose is None or source is None:
@@ -128,7 +129,7 @@ class Shown:
         """Red, green and blue, 0 to 255, of each cable by its tension; grey if unknown."""
         if self.tensions is None:
             return [GREY] * (0 if self.posture is None else len(self.posture.arm.cables))
-        colors = color_scale(self.tensions).to_rgba(self.tensions, bytes=True)
+        colors = tension_colors(self.tensions).to_rgba(self.tensions, bytes=True)
         return [(int(r), int(g), int(b)) for r, g, b, _ in colors]
 
     @cached_property

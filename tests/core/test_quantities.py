@@ -54,8 +54,9 @@ def test_a_quantity_of_one_row_is_swept_and_drawn() -> None:
     dataset = cdsm.sweep(arm, Q, minimum=20.0, outputs=("tip_position", "trace"))
     np.testing.assert_allclose(dataset["trace"], expected(arm), rtol=1e-10)
     assert dataset["trace"].attrs["units"] == "N m rad-1"
-    figure = plots.plot_map(dataset, "trace", section=("y", 0.0, 1.0))
-    assert figure.axes[-1].get_ylabel() == "trace of the joint stiffness [N m/rad]"
+    (ax,) = plots.plot_map(dataset, "trace", section=("y", 0.0, 1.0))
+    bar = ax.figure.axes[-1]
+    assert bar.get_xlabel().startswith("trace of the joint stiffness [N m/rad]")
 
 
 @pytest.mark.usefixtures("trace")

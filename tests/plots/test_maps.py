@@ -1,78 +1,146 @@
-"""Workspace maps show every tip where it is, in mm, under its own colour or as unstable."""
+"""Maps show every value in its cell, in its unit, and hatch what does not hold."""
 
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.collections import PathCollection
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 import cdsm
 from cdsm import plots
-from cdsm.support.values import Array
+from cdsm.plots import maps
+from cdsm.plots.maps import Cells
+from tests.support.pictures import artists, line, require_look
 from tests.support.sweeps import short_arm
 
-PLANAR = cdsm.GridPoses(
-    {"joint1_1": np.linspace(-0.4, 0.4, 5), "joint3_1": np.linspace(-0.4, 0.4, 4)}
-)
-
-
-def drawn(figure: Figure, panel: int = 0) -> list[PathCollection]:
-    """The scatters of a panel: tips without a value, unstable ones, then colours."""
-    figure.draw_without_rendering()
-    return [each for each in figure.axes[panel].collections if isinstance(each, PathCollection)]
-
-
-def places(scatter: PathCollection) -> Array:
-    return np.asarray(scatter.get_offsets(), dtype=np.float64)
+BENDS = np.deg2rad([-20.0, -5.0, 5.0, 15.0])
+PLANAR = cdsm.GridPoses({"joint1_1": BENDS, "joint3_1": np.deg2rad([-10.0, 0.0, 10.0])})
 
 
 @pytest.fixture(scope="module")
 def planar() -> xr.Dataset:
-    """Springs so soft that the upper bounds buckle the arm, in the plane of x and z."""
-    return cdsm.sweep(short_arm(spring=1500.0), PLANAR, minimum=[5.0, 40.0, 100.0])
+    """Springs so soft that the upper bounds buckle the arm."""
+    return cdsm.sweep(
+        short_arm(spring=1500.0, lead=0.5), PLANAR, minimum=[5.0, 40.0, 100.0], progress=False
+    )
 
 
-def test_tips_in_a_plane_are_shown_in_mm_and_the_unstable_are_marked(planar: xr.Dataset) -> None:
-    figure = plots.plot_map(planar, "softest")
-    (colors,) = drawn(figure)
-    tips = 1e3 * planar.tip_position.values.reshape(-1, 3)
-    assert abs(tips[:, 1]).max() < 1e-9
-    np.testing.assert_allclose(places(colors), tips[:, [0, 2]], rtol=1e-12)
-    shown = np.asarray(colors.get_array())
-    np.testing.assert_allclose(shown, 1e-3 * planar.softest[..., 0].values.ravel(), rtol=1e-12)
-    axes: Any = figure.axes[0]
-    assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_aspect()) == ("x [mm]", "z [mm]", 1.0)
-    assert "[N/mm]" in figure.axes[-1].get_ylabel()
-    marked, colors = drawn(figure, 2)
-    np.testing.assert_allclose(places(marked), tips[:, [0, 2]])
-    assert not len(places(colors))
-    (colors,) = drawn(plots.plot_map(planar, "margin"), 2)
-    shown, margins = np.asarray(colors.get_array()), planar.margin[..., 2].values.ravel()
-    assert (shown < 0.0).all()
-    np.testing.assert_allclose(shown, margins, rtol=1e-12)
-    assert colors.norm.vmin == -colors.norm.vmax  # type: ignore[operator]
+def cells(ax: Any) -> Any:
+    """The drawn values (n, m), NaN where there are none."""
+    mesh = artists(ax, "cells")["cells"]
+    return np.ma.filled(mesh.get_array().astype(float), np.nan)
+
+
+def test_cells_of_two_joints_have_their_value_at_their_angles(planar: xr.Dataset) -> None:
+    axs = plots.plot_map(planar.sel(minimum=5.0), "along")
+    for ax, u in zip(axs, "xyz", strict=True):
+        values = 1e-3 * planar.along.sel(minimum=5.0, direction=u).values
+        shown = cells(ax)
+        finite = np.isfinite(values.T)
+        np.testing.assert_allclose(shown[finite], values.T[finite])
+        x, y = artists(ax, "cells")["cells"].get_coordinates()[[0, -1], [0, -1]].T
+        np.testing.assert_allclose(x, [-27.5, 20.0])  # half a step beyond the angles
+        np.testing.assert_allclose(y, [-15.0, 15.0])
+        assert (ax.get_xlabel(), ax.get_ylabel()) == ("joint1_1 [°]", "joint3_1 [°]")
+    norms = [artists(ax, "cells")["cells"].norm for ax in axs]
+    assert norms[0].vmax > 3.0 * norms[1].vmax  # a scale for each direction
+    figure = axs[0].figure
+    labels = [ax.get_xlabel() for ax in figure.axes if ax not in list(axs)]
+    assert labels == [f"stiffness along {u} [N/mm]" for u in "xyz"]
+    require_look(axs)
+
+
+def test_unstable_cells_are_hatched_and_cases_share_a_scale(planar: xr.Dataset) -> None:
+    axs = plots.plot_map(planar, "softest")
+    limits = {artists(ax, "cells")["cells"].get_clim() for ax in axs}
+    assert len(limits) == 1
+    assert not artists(axs[0], "fault:")
+    (hatched,) = artists(axs[2], "fault:").items()
+    assert hatched[0] == "fault:unstable"
+    assert len(hatched[1].get_paths()) == 12
+    assert np.isnan(cells(axs[2])).all()
+    margins = plots.plot_map(planar, "margin")
+    np.testing.assert_allclose(cells(margins[2]), planar.margin.sel(minimum=100.0).values.T)
+    norm = artists(margins[2], "cells")["cells"].norm
+    assert norm.vmin == -norm.vmax
+    require_look(axs)
+
+
+def test_a_missing_cell_is_hatched_and_an_infinite_one_has_the_top_colour() -> None:
+    values = np.array([[1.0, 2.0, np.nan], [4.0, 5.0, np.inf]])
+    faults = {"no balance": np.isnan(values)}
+    panel = Cells(
+        "", np.arange(4.0), 10.0 * np.arange(3.0), values, faults, ("x [mm]", "y [mm]"), ""
+    )
+    ax = Figure().subplots()
+    colors, extend = maps._colors([values])
+    maps._draw(ax, panel, colors)
+    shown = cells(ax)
+    np.testing.assert_allclose(shown[0, :2], [1.0, 2.0])
+    np.testing.assert_allclose(shown[1, :2], [4.0, 5.0])
+    assert np.isnan(shown[0, 2])
+    assert shown[1, 2] > 1e100
+    assert extend in ("max", "both")
+    assert colors.get_clim()[1] <= 5.0
+    (hatch,) = artists(ax, "fault:no balance").values()
+    np.testing.assert_allclose(hatch.get_paths()[0].get_extents().bounds, [2.0, 0.0, 1.0, 10.0])
+
+
+def test_bins_are_medians_by_hand() -> None:
+    points = np.array([[0.5, 0.5], [0.6, 0.4], [0.7, 0.1], [2.5, 1.5], [1.5, 0.5]])
+    values = np.array([1.0, 9.0, 2.0, np.inf, 4.0])
+    edges = np.arange(4.0), np.arange(3.0)
+    binned = maps.bin_values(points, values, edges, "median")
+    np.testing.assert_array_equal(binned, [[2.0, 4.0, np.nan], [np.nan, np.nan, np.inf]])
+    assert maps.bin_values(points, values, edges, "max")[0, 0] == 9.0
+
+
+def test_wide_ranges_have_logarithmic_colours() -> None:
+    for values, logarithmic in (
+        (np.linspace(1.0, 7.0, 50), False),
+        (np.geomspace(1, 20, 50), True),
+    ):
+        colors, _ = maps._colors([values])
+        assert isinstance(colors.norm, LogNorm) == logarithmic
 
 
 def test_a_cloud_is_shown_in_slices_and_a_section_has_its_tips_alone() -> None:
     arm = short_arm(cdsm.presets.STRAND_1X19)
-    found = cdsm.sweep(arm, cdsm.RandomPoses(256), minimum=20.0, maximum=400.0)
-    figure = plots.plot_map(found, "along")
-    figure.draw_without_rendering()
-    assert "no value" in [text.get_text() for text in figure.legends[0].get_texts()]
+    dataset = cdsm.sweep(arm, cdsm.RandomPoses(256), minimum=20.0, maximum=400.0, progress=False)
+    axs = plots.plot_map(dataset)
+    assert len(axs) == 3
+    assert any("no balance" in gid for ax in axs for gid in artists(ax, "fault:"))
+    (ax,) = plots.plot_map(dataset, section=("y", 0.01, 0.02))
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [mm]", "z [mm]")
+    tips = 1e3 * dataset.tip_position.values
+    inside = abs(tips[:, 1] - 10.0) <= 20.0
+    values = 1e-3 * dataset.softest.values[inside]
+    binned = cells(ax)
+    low, high = np.nanmin(values), np.nanmax(values)
+    assert low <= np.nanmin(binned) <= np.nanmax(binned) <= high
+    holds = int(np.isfinite(values).sum())
+    assert f"{holds} of {inside.sum()} postures hold" in ax.get_title(loc="left")
+    edges = artists(ax, "cells")["cells"].get_coordinates()
+    assert edges[..., 0].min() <= tips[inside, 0].min()
+    assert edges[..., 1].max() >= tips[inside, 2].max()
+    require_look(axs)
 
-    section = plots.plot_map(found, "softest", section=("y", 0.01, 0.02))
-    shown = np.vstack([places(each) for each in drawn(section)])
-    tips = 1e3 * found.tip_position.values
-    inside = tips[abs(tips[:, 1] - 10.0) <= 20.0]
-    assert 0 < len(inside) < len(tips)
-    order = [np.lexsort(each.T) for each in (shown, inside[:, [0, 2]])]
-    np.testing.assert_allclose(shown[order[0]], inside[:, [0, 2]][order[1]], rtol=1e-12)
+
+def test_a_path_is_a_curve_over_the_way() -> None:
+    arm = short_arm(cdsm.presets.STRAND_1X19)
+    way = cdsm.PathPoses([np.zeros(6), np.full(6, 0.1)], 5)
+    dataset = cdsm.sweep(arm, way, minimum=[10.0, 20.0], progress=False)
+    (ax,) = plots.plot_map(dataset)
+    x, y = line(ax, "line:tensions from 20 N").T
+    np.testing.assert_allclose(x, np.rad2deg(dataset.distance.values))
+    np.testing.assert_allclose(y, 1e-3 * dataset.softest.sel(minimum=20.0).values)
+    require_look(ax)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "problem"),
     [
         ({"quantity": "status"}, "quantity: status has the dimensions"),
         ({"quantity": "softness"}, r"no quantity is called 'softness'.*must be among outputs of"),
@@ -81,7 +149,7 @@ def test_a_cloud_is_shown_in_slices_and_a_section_has_its_tips_alone() -> None:
     ],
 )
 def test_what_cannot_be_shown_is_named(
-    arguments: dict[str, Any], said: str, planar: xr.Dataset
+    arguments: dict[str, Any], problem: str, planar: xr.Dataset
 ) -> None:
-    with pytest.raises(cdsm.CdsmError, match=said):
+    with pytest.raises(cdsm.CdsmError, match=problem):
         plots.plot_map(planar, **arguments)

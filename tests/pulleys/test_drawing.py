@@ -4,6 +4,7 @@ import numpy as np
 
 import cdsm
 from cdsm import Pulley, Site
+from tests.support.pictures import artists
 from tests.support.pulleys import Link, arm_of
 
 HINGE = [Link("phalanx", "base", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))]
@@ -37,11 +38,9 @@ def test_a_lifted_cable_is_straight_and_its_pulley_dashed() -> None:
     for angle, style in ((0.5, "-"), (-0.5, "--")):
         pose = arm.at([angle])
         assert (len(pose.cable_paths[0]) == 2) == (style == "--")
-        axes = pose.plot().axes[0]
-        circles = [line for line in axes.lines if len(line.get_data_3d()[0]) == 37]
-        assert [line.get_linestyle() for line in circles] == [style]
-        x, y, _ = circles[0].get_data_3d()
-        np.testing.assert_allclose(np.hypot(x, y), 1e3 * R, rtol=1e-12)
+        (circle,) = artists(pose.plot(view=(90.0, -90.0)), "pulley:").values()  # from above
+        assert circle.get_linestyle() == style
+        np.testing.assert_allclose(np.hypot(*circle.get_xydata().T), 1e3 * R, rtol=1e-9)
 
 
 def test_clearances_count_the_arcs() -> None:

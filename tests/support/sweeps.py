@@ -15,10 +15,12 @@ STEEL = cdsm.LinearElasticity(48e3)
 WRENCHES = {"none": np.zeros(6), "pulled": np.array([1.0, 0.5, -2.0, 0.0, 0.05, 0.1])}
 
 
-def short_arm(elasticity: cdsm.Elasticity = STEEL, spring: float = np.inf) -> cdsm.Manipulator:
+def short_arm(
+    elasticity: cdsm.Elasticity = STEEL, spring: float = np.inf, lead: float = 0.0
+) -> cdsm.Manipulator:
     """Three universal joints, and limits that a grid can go beyond."""
     sizes = {"link_length": 0.05, "base_length": 0.02, "disk_offset": 0.01, "hole_radius": 0.02}
-    geometry = readme_geometry(joints=3, link_mass=0.1, lead=0.0, joint_limit=0.92, **sizes)
+    geometry = readme_geometry(joints=3, link_mass=0.1, lead=lead, joint_limit=0.92, **sizes)
     cables = cdsm.serpentine_cables(geometry, elasticity, series_stiffness=spring)
     return cdsm.Manipulator(geometry, cables=cables, gravity=(0.0, -2.0, -9.0))
 

@@ -1,0 +1,214 @@
+"""Pictures of arms: what is drawn stands where it is, on ordinary axes."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib import pyplot
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from PIL import Image
+
+import cdsm
+from cdsm import plots
+from cdsm.planning.path_plan import PathPlan
+from cdsm.plots.projection import projection
+from cdsm.plots.style import TENSIONS
+from tests.support.arms import mixed_arm, random_posture
+from tests.support.pictures import artists, line, require_look
+from tests.support.sweeps import short_arm
+
+POSE = random_posture(mixed_arm(), 3)
+PULL = cdsm.distribute_tension(POSE, 10.0)
+K = cdsm.stiffness(POSE, PULL)
+FRONT = (0.0, -90.0)
+"""The eye in −y: x is right, and z is up."""
+
+
+def one_panel() -> Any:
+    return Figure(figsize=(3.0, 3.0)).subplots()
+
+
+def test_views_are_what_the_eye_sees() -> None:
+    np.testing.assert_allclose(projection(*FRONT), [[1, 0, 0], [0, 0, 1], [0, -1, 0]], atol=1e-12)
+    top = projection(90.0, -90.0)
+    np.testing.assert_allclose(top, np.eye(3), atol=1e-12)  # from above: x right, y up
+    for view in ((22.0, -62.0), (-30.0, 140.0)):
+        rows = projection(*view)
+        np.testing.assert_allclose(rows @ rows.T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(rows) == pytest.approx(1.0)  # no mirror
+
+
+def test_cables_stand_where_they_are_coloured_by_tension_and_nearer_ones_in_front() -> None:
+    ax = plots.plot_arm(POSE, PULL, view=FRONT)
+    lines = artists(ax, "cable:")
+    layers, depths = [], []
+    low, high = PULL.values.min(), PULL.values.max()
+    for name, path, F in zip(POSE.arm.cables.names, POSE.cable_paths, PULL.values, strict=True):
+        for k in range(len(path) - 1):
+            segment = lines.pop(f"cable:{name}:{k}")
+            np.testing.assert_allclose(segment.get_xydata(), 1e3 * path[k : k + 2, [0, 2]])
+            shade = TENSIONS((F - low) / (high - low))
+            np.testing.assert_allclose(to_rgba(segment.get_color()), shade, atol=1e-9)
+            layers.append(segment.get_zorder())
+            depths.append(-path[k : k + 2, 1].mean())
+    assert not lines
+    assert sum(TENSIONS(1.0)[:3]) > 2.0 * sum(TENSIONS(0.0)[:3])  # brighter: pulled more
+    assert (np.diff(np.array(layers)[np.argsort(depths)]) > -1e-12).all()
+    assert np.ptp(layers) > 0.01
+    for k, bone in enumerate(POSE.bones):
+        np.testing.assert_allclose(line(ax, f"bone:{k}"), 1e3 * bone[:, [0, 2]])
+    assert len(artists(ax, "disk:")) == len(POSE.arm.geometry.disks)
+    np.testing.assert_allclose(line(ax, "tip"), 1e3 * POSE.tip[None, [0, 2], 3])
+    assert ax.get_aspect() == 1.0
+    require_look(ax)
+
+
+def test_no_force_moves_the_tip_beyond_the_outline_and_some_reach_it() -> None:
+    view = (22.0, -62.0)
+    ax = plots.plot_arm(POSE, PULL, K, view=view, scale=50.0)
+    rows = projection(*view)[:2]
+    edge = artists(ax, "compliance")["compliance"].get_xy() - 1e3 * rows @ POSE.tip[:3, 3]
+    forces = np.random.default_rng(0).normal(size=(20_000, 3))
+    forces /= np.linalg.norm(forces, axis=1)[:, None]
+    moved = 50.0 * 1e3 * (forces @ K.compliance[:3, :3].T) @ rows.T
+    for turn in np.linspace(0.0, 2.0 * np.pi, 17):
+        n = np.array([np.cos(turn), np.sin(turn)])
+        assert (moved @ n).max() == pytest.approx((edge @ n).max(), rel=1e-2)
+    words = [text.get_text() for text in ax.texts]
+    longest = 1e3 * np.linalg.norm(K.compliance[:3, :3], 2)
+    assert f"1 N moves it by up to {longest:.2g} mm, drawn × 50" in words
+
+
+def test_load_is_an_arrow_along_the_force() -> None:
+    ax = plots.plot_arm(POSE, force=[0.0, 0.0, -4.0], view=FRONT)
+    arrow = artists(ax, "force")["force"]
+    start, end = arrow._posA_posB
+    np.testing.assert_allclose(start, 1e3 * POSE.tip[[0, 2], 3])
+    assert end[0] == pytest.approx(start[0])
+    assert end[1] < start[1]  # down
+    assert "4 N" in [text.get_text() for text in ax.texts]
+
+
+def test_slack_cables_are_dashed_and_an_unstable_arm_is_called_so() -> None:
+    values = PULL.values.copy()
+    values[3] = 0.0
+    lines = artists(plots.plot_arm(POSE, values), "cable:")
+    dashed = {gid.split(":")[1] for gid, path in lines.items() if path.get_linestyle() != "-"}
+    assert dashed == {POSE.arm.cables.names[3]}
+    loose = short_arm(spring=1500.0, lead=0.5).at(np.zeros(6))
+    buckled = cdsm.stiffness(loose, cdsm.distribute_tension(loose, 100.0))
+    assert not buckled.is_stable
+    ax = buckled.plot()
+    assert any("UNSTABLE" in text.get_text() for text in ax.texts)
+    assert not artists(ax, "compliance")
+
+
+def test_equilibrium_is_drawn_with_its_load_over_its_reference() -> None:
+    rest = cdsm.equilibrium(POSE, PULL, wrench=[0.0, 0.0, -0.3, 0.0, 0.0, 0.0])
+    ax = rest.plot(view=FRONT)
+    np.testing.assert_allclose(line(ax, "bone:1"), 1e3 * rest.pose.bones[1][:, [0, 2]])
+    np.testing.assert_allclose(line(ax, "ghost:1"), 1e3 * POSE.bones[1][:, [0, 2]])
+    assert artists(ax, "force")
+    assert artists(ax, "compliance")
+    require_look(ax)
+
+
+def test_arms_beside_each_other_have_one_scale() -> None:
+    straight = POSE.arm.at(0.5 * POSE.q)
+    F = cdsm.distribute_tension(straight, 20.0)
+    cases = [(POSE, PULL, K, "a"), (straight, F, cdsm.stiffness(straight, F), "b")]
+    first, second = plots.plot_arms(cases)
+    assert np.ptp(first.get_xlim()) == pytest.approx(np.ptp(second.get_xlim()))
+    assert np.ptp(first.get_ylim()) == pytest.approx(np.ptp(second.get_ylim()))
+    both = np.concatenate([PULL.values, F.values])
+    for ax, values in ((first, PULL.values), (second, F.values)):
+        name = POSE.arm.cables.names[0]
+        share = (values[0] - both.min()) / np.ptp(both)
+        color = artists(ax, "cable:")[f"cable:{name}:0"].get_color()
+        np.testing.assert_allclose(to_rgba(color), TENSIONS(share), atol=1e-9)
+    assert (first.get_title(loc="left"), second.get_title(loc="left")) == ("a", "b")
+    require_look([first, second])
+
+
+def test_axes_of_the_caller_keep_their_figure_and_neighbours() -> None:
+    figure, (left, right) = pyplot.subplots(1, 2, figsize=(7.0, 3.0))
+    before = right.spines["top"].get_visible(), dict(pyplot.rcParams)
+    assert K.plot(ax=left, title="") is left
+    assert (right.spines["top"].get_visible(), dict(pyplot.rcParams)) == before
+    assert left.get_title(loc="left") == ""
+    assert tuple(figure.get_size_inches()) == (7.0, 3.0)
+    assert POSE.plot(PULL, K, ax=right, view=FRONT) is right
+    pyplot.close(figure)
+
+
+@pytest.fixture(scope="module")
+def plan() -> PathPlan:
+    q = np.linspace(1.0, 0.999, 3)[:, None] * POSE.q
+    reach = cdsm.stiffness_range(POSE, "z", 10.0, 200.0)
+    target = 0.8 * reach.low + 0.2 * reach.high
+    return cdsm.plan_path(POSE.arm, "z", target, 10.0, 200.0, angles=q)
+
+
+def test_path_has_the_way_of_the_tip_and_a_film(plan: PathPlan, tmp_path: Path) -> None:
+    ax = plots.plot_path(plan, view=FRONT, animate=tmp_path / "arm.gif")
+    tips = [posture.tip[[0, 2], 3] for posture in (K.posture for K in plan.stiffness)]
+    np.testing.assert_allclose(line(ax, "way"), 1e3 * np.array(tips))
+    last = plan.stiffness[-1].posture
+    np.testing.assert_allclose(line(ax, "bone:1"), 1e3 * last.bones[1][:, [0, 2]])
+    require_look(ax)
+    with Image.open(tmp_path / "arm.gif") as film:
+        assert film.n_frames == 3  # type: ignore[attr-defined]
+
+
+def test_modes_are_drawn_in_their_shapes() -> None:
+    modes = cdsm.modes(K)
+    ax = modes.plot(view=FRONT)
+    name = f"{modes.frequencies[0]:.3g} Hz"
+    tip = line(ax, f"mode:{name}:{len(POSE.bones) - 1}")[-1] / 1e3 - POSE.tip[[0, 2], 3]
+    wanted = (POSE.jacobian[:3] @ modes.shapes[:, 0])[[0, 2]]
+    assert tip @ wanted > 0.9 * np.linalg.norm(tip) * np.linalg.norm(wanted)
+    assert name in [text.get_text() for text in ax.get_legend().get_texts()]
+    require_look(ax)
+
+
+def test_forces_within_the_outline_are_those_that_cables_balance() -> None:
+    polytope = cdsm.force_polytope(POSE, 10.0, 200.0)
+    ax = polytope.plot(view=FRONT)
+    outline = artists(ax, "outline")["outline"].get_xy()
+    corners = polytope.vertices[:, [0, 2]]
+    np.testing.assert_allclose(outline.max(axis=0), corners.max(axis=0))
+    np.testing.assert_allclose(outline.min(axis=0), corners.min(axis=0))
+    worst = polytope.radius * polytope.worst_direction[[0, 2]]
+    np.testing.assert_allclose(line(ax, "worst"), [[0.0, 0.0], worst], atol=1e-12)
+    require_look(ax)
+
+
+def test_what_cannot_be_drawn_is_named(tmp_path: Path) -> None:
+    other: Any = cdsm.presets.virtual_prototype().at(np.zeros(10))
+    jpg, film = tmp_path / "a.jpg", tmp_path / "a.mp4"
+    solid = Figure().add_subplot(projection="3d")
+    for call, problem in (
+        (lambda: plots.plot_arm(3), "pose: 3 given; a Posture is needed"),  # type: ignore[arg-type]
+        (lambda: plots.plot_arm(other, PULL), "tension: belongs to another arm"),
+        (lambda: plots.plot_arm(other, [1.0]), "tension: "),
+        (lambda: plots.plot_arm(other, stiffness=K), "stiffness: belongs to another posture"),
+        (lambda: plots.plot_arm(POSE, ax=solid), "ax: axes of the kind '3d' given"),
+        (lambda: plots.plot_arms([(POSE,), (POSE,)], [one_panel()]), "axs: has 1 of the 2 axes"),
+        (lambda: plots.plot_path([POSE, other]), "path: give postures of one arm"),
+        (lambda: plots.plot_path([POSE], animate=film), r"must end in \.gif"),
+        (lambda: plots.save_figure(POSE.plot(), jpg), r"path: .*\.pdf, \.svg, \.png"),
+    ):
+        with pytest.raises(cdsm.InvalidInput, match=problem):
+            call()
+
+
+@pytest.mark.parametrize("suffix", [".pdf", ".svg", ".png"])
+def test_figures_have_the_same_bytes_each_time(tmp_path: Path, suffix: str) -> None:
+    once, twice = (
+        plots.save_figure(PULL.plot(), tmp_path / f"{k}{suffix}").read_bytes() for k in "ab"
+    )
+    assert once == twice
+    assert b"CreationDate" not in once
+    assert b"<dc:date>" not in once

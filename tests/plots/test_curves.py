@@ -1,0 +1,206 @@
+"""Curves and bars show the numbers of their results, with signs, units, events and names."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm import plots
+from cdsm.plots.style import move_apart, round_numbers
+from tests.support.arms import mixed_arm, random_posture
+from tests.support.pictures import artists, line, require_look
+from tests.support.sweeps import short_arm
+
+SHAPE = np.deg2rad([10.0, 5.0, 10.0, 5.0, -8.0, 0.0, -8.0, 0.0])
+POSE = random_posture(mixed_arm(), 3)
+PULL = cdsm.distribute_tension(POSE, 10.0)
+K = cdsm.stiffness(POSE, PULL)
+
+
+@pytest.fixture(scope="module")
+def slender() -> cdsm.Posture:
+    """An arm whose cables go slack one after the other under a weight."""
+    geometry = cdsm.Geometry.universal(
+        joints=4, cables_per_joint=3, link_length=0.06, base_length=0.03, disk_offset=0.012,
+        hole_radius=0.025, link_mass=0.12, lead=0.3, joint_limit=0.5,
+    )  # fmt: skip
+    return cdsm.Manipulator(geometry, elasticity=cdsm.LinearElasticity(48e3)).at(SHAPE)
+
+
+@pytest.mark.parametrize("direction", ["x", "z"])
+def test_curve_over_tension_is_the_stiffness_and_the_sum_of_its_terms(direction: str) -> None:
+    levels = [10.0, 20.0, 40.0, 80.0]
+    ax = plots.plot_stiffness_over_tension(POSE, levels, direction)
+    x, y = line(ax, "along").T
+    np.testing.assert_allclose(x, levels)
+    along = [
+        cdsm.stiffness(POSE, cdsm.distribute_tension(POSE, level)).along(direction)
+        for level in levels
+    ]
+    np.testing.assert_allclose(y, 1e-3 * np.array(along))
+    terms = {gid: line(ax, gid)[:, 1] for gid in artists(ax, "term:")}
+    np.testing.assert_allclose(sum(terms.values()), y, atol=5e-3 * y.max())  # small ones left out
+    K80 = cdsm.stiffness(POSE, cdsm.distribute_tension(POSE, 80.0))
+    shares = K80.shares(direction)
+    assert terms["term:passive"][-1] == pytest.approx(1e-3 * shares.passive.sum())
+    assert terms["term:active"][-1] == pytest.approx(1e-3 * shares.active.sum())
+    assert ax.get_xlabel() == "least tension of all cables [N]"
+    assert ax.get_ylabel() == f"stiffness along {direction} [N/mm]"
+    require_look(ax)
+
+
+def test_curve_begins_at_the_tension_that_held() -> None:
+    """A cable asks for 30 N; levels below have no effect, and are no points of the curve."""
+    arm = POSE.arm.with_cables([replace(cable, minimum=30.0) for cable in POSE.arm.cables])
+    pose = arm.at(POSE.q)
+    ax = plots.plot_stiffness_over_tension(pose, [5.0, 10.0, 50.0, 90.0])
+    np.testing.assert_allclose(line(ax, "along")[:, 0], [30.0, 50.0, 90.0])
+
+
+def test_saturation_and_buckling_are_marked_where_they_are() -> None:
+    bent = short_arm(cdsm.presets.STRAND_1X19, lead=0.3).at(np.full(6, 0.1))
+    saturated = cdsm.saturation(bent, "z")
+    ax = saturated.plot()
+    assert line(ax, "saturation")[0, 0] == pytest.approx(saturated.bound)
+    require_look(ax)
+    soft = short_arm(spring=1500.0, lead=0.5).at(np.zeros(6))
+    critical = cdsm.critical_tension(soft)
+    levels = critical.minimum * np.array([0.2, 0.5, 0.8, 0.95, 1.1, 1.3])
+    ax = plots.plot_stiffness_over_tension(soft, levels)
+    assert np.isnan(line(ax, "along")[4:, 1]).all()
+    shade = artists(ax, "unstable")["unstable"]
+    assert shade.get_x() == pytest.approx(critical.minimum)
+    assert f"buckles from {critical.minimum:.3g} N" in ax.get_title(loc="left")
+    require_look(ax)
+    ax = critical.plot()
+    np.testing.assert_allclose(line(ax, "margin").T, [critical.bounds, critical.margins])
+    assert line(ax, "event:buckling")[0, 0] == critical.minimum
+    require_look(ax)
+
+
+def test_curve_of_a_sweep_has_a_scale_for_each_direction() -> None:
+    dataset = cdsm.sweep(POSE.arm, [POSE.q], minimum=[10.0, 20.0, 40.0], progress=False)
+    axs = plots.plot_tension_curve(dataset)
+    for ax, u in zip(axs, "xyz", strict=True):
+        values = dataset.along.sel(direction=u).values.ravel()
+        np.testing.assert_allclose(line(ax, f"curve:{u}"), np.c_[[10, 20, 40], 1e-3 * values])
+        assert ax.get_ylim()[1] < 1.5e-3 * values.max()
+    require_look(axs)
+
+
+def test_weight_goes_up_with_the_displacement_and_events_stand_at_their_loads(
+    slender: cdsm.Posture,
+) -> None:
+    tension = cdsm.distribute_tension(slender, minimum=10.0)
+    test = cdsm.weight_test(slender, tension, [0.0, 0.0, -12.0], steps=12)
+    ax = test.plot()
+    moved, loads = line(ax, "test").T
+    np.testing.assert_allclose(loads[1:], test.loads)
+    # down, along the weight, is positive
+    np.testing.assert_allclose(moved[1:], -1e3 * test.displacements[:, 2])
+    assert moved[-1] > 0.0
+    slope = np.diff(line(ax, "linear"), axis=0)[0]
+    assert slope[1] / slope[0] == pytest.approx(1e-3 * test.tangent)
+    slack = [event for event in test.events if event.kind == "slack"]
+    assert slack
+    for event in slack:
+        (x, y) = line(ax, f"event:{event}")[0]
+        assert y == event.load
+        assert x == pytest.approx(np.interp(event.load, loads, moved))
+        before = cdsm.weight_test(slender, tension, [0.0, 0.0, 0.01 - event.load], steps=2)
+        assert before.tensions[-1][slender.arm.cables.names.index(event.place)] > 0.0
+    assert f"{slack[0]}" in [text.get_text() for text in ax.texts]
+    require_look(ax)
+
+
+@pytest.fixture(scope="module")
+def history() -> Any:
+    rough = cdsm.presets.virtual_prototype(
+        cdsm.LinearElasticity(48e3), lead=0.3, friction=0.1, gravity="-z"
+    ).at(np.full(10, np.deg2rad(10.0)))
+    up = np.linspace(0.0, 6.0, 7)
+    force = np.concatenate([up, up[-2::-1], -up[1:], -up[-2::-1], up[1:]])
+    wrenches = np.outer(force, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    return cdsm.load_cycle(rough, cdsm.distribute_tension(rough, minimum=50.0), wrenches)
+
+
+def test_area_of_the_loop_is_the_work_lost(history: Any) -> None:
+    ax = history.plot()
+    moved, force = line(ax, "loop").T
+    np.testing.assert_allclose(force[1:], history.wrenches[:, 2])
+    np.testing.assert_allclose(moved[1:], 1e3 * history.displacement[:, 2])
+    x, y = artists(ax, "lost")["lost"].get_xy().T
+    area = abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2.0  # mJ
+    lost = 1e3 * history.dissipated[-24:].sum()
+    assert area == pytest.approx(lost, rel=0.1)  # straight between the loads
+    assert f"{lost:.3g} mJ lost per cycle" in [text.get_text() for text in ax.texts]
+    slips = [line(ax, gid)[0] for gid in artists(ax, "event:holes slide")]
+    first = int(np.flatnonzero((history.sliding != 0).any(axis=1))[0])
+    np.testing.assert_allclose(slips, [[moved[first + 1], force[first + 1]]])
+    require_look(ax)
+
+
+def test_bars_of_shares_add_up_to_the_stiffness() -> None:
+    shares = K.shares("z")
+    ax = shares.plot()
+    widths = [bar.get_width() for bar in ax.patches]
+    assert sum(widths) == pytest.approx(1e-3 * K.along("z"))
+    count = len(POSE.arm.cables)
+    np.testing.assert_allclose(widths[:count], 1e-3 * shares.passive)
+    np.testing.assert_allclose(widths[count : 2 * count], 1e-3 * shares.active)
+    names = [text.get_text() for text in ax.get_yticklabels()]
+    assert names[:count] == list(POSE.arm.cables.names)
+    assert ax.get_ylim()[0] > ax.get_ylim()[1]  # first on top
+    percents = [text.get_text() for text in ax.texts][:count]
+    assert percents == [f"{100.0 * shares[name] / shares.total:z.1f} %" for name in names[:count]]
+    require_look(ax)
+
+
+def test_bars_of_tensions_are_tensions_between_their_bounds() -> None:
+    ax = PULL.plot(breaking=500.0)
+    for name in PULL:
+        assert artists(ax, "tension:")[f"tension:{name}"].get_width() == PULL[name]
+    texts = [text.get_text() for text in ax.texts]
+    first = PULL.values[0]
+    assert texts[0] == f"{first:.1f} N, {first / 5.0:.0f} %"
+    np.testing.assert_allclose(line(ax, "bound:minimum")[:, 0], 10.0)
+    require_look(ax)
+    with pytest.raises(cdsm.InvalidInput, match="breaking: -5 N given"):
+        PULL.plot(breaking=-5.0)
+
+
+def test_plans_stand_between_the_softest_and_the_stiffest_arm() -> None:
+    reach = cdsm.stiffness_range(POSE, "z", 10.0, 200.0)
+    plan = cdsm.plan_stiffness(POSE, "z", 0.8 * reach.low + 0.2 * reach.high, 10.0, 200.0)
+    for ax in (plan.plot(reach), reach.plot()):
+        np.testing.assert_allclose(line(ax, "softest")[:, 0], reach.low_tension.values)
+        np.testing.assert_allclose(line(ax, "stiffest")[:, 0], reach.high_tension.values)
+        words = [text.get_text() for text in ax.get_legend().get_texts()]
+        assert words == [
+            f"softest: {1e-3 * reach.low:.4g} N/mm",
+            f"stiffest: {1e-3 * reach.high:.4g} N/mm",
+        ]
+        require_look(ax)
+    bars = artists(plan.plot(), "tension:").values()
+    np.testing.assert_allclose([bar.get_width() for bar in bars], plan.tension.values)
+    other = cdsm.stiffness_range(POSE, "x", 10.0, 200.0)
+    with pytest.raises(cdsm.InvalidInput, match="attainable: is not of the posture"):
+        plan.plot(other)
+
+
+def test_critical_load_is_marked_at_its_factor() -> None:
+    critical = cdsm.critical_load(POSE, np.eye(6)[0], 10.0)
+    ax = critical.plot()
+    np.testing.assert_allclose(line(ax, "margin").T, [critical.factors, critical.margins])
+    if np.isfinite(critical.factor):
+        assert line(ax, "event:end")[0, 0] == critical.factor
+    require_look(ax)
+
+
+def test_names_move_apart_in_their_order_and_ticks_are_round() -> None:
+    moved = move_apart(np.array([3.0, 1.0, 1.1]), 0.5, 0.0, 4.0)
+    assert moved[1] < moved[2] < moved[0]
+    assert np.diff(np.sort(moved)).min() > 0.499
+    assert round_numbers(49.7, 95.6) == [50.0, 60.0, 70.0, 80.0, 90.0]

@@ -1,0 +1,202 @@
+"""Pictures of fits, plans, budgets and runs show the numbers of their results."""
+
+import importlib
+import inspect
+import pkgutil
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import cdsm
+from cdsm import paper, plots, track
+from cdsm.identification import Identification, WeightLoop, identify
+from cdsm.planning.path_plan import PathPlan
+from cdsm.support.values import Plotted
+from tests.identification import test_search as identified
+from tests.support.pictures import artists, line, panels, require_look
+from tests.support.sweeps import short_arm
+from tests.support.tracking import small_path
+
+STRAND = cdsm.presets.STRAND_1X19
+
+
+def test_wanted_and_reached_stiffness_of_a_plan_are_positive_and_tensions_its_own() -> None:
+    plan: PathPlan = small_path(0.0)
+    axs = plan.plot()
+    above, below = axs
+    np.testing.assert_allclose(line(above, "wanted:z")[:, 1], 1e-3 * plan.target)
+    np.testing.assert_allclose(line(above, "reached:z")[:, 1], 1e-3 * plan.achieved)
+    for name, values in zip(plan.arm.cables.names, plan.tensions.T, strict=True):
+        np.testing.assert_allclose(line(below, f"tension:{name}"), np.c_[[0, 1, 2], values])
+    require_look(axs)
+
+
+def test_infeasible_samples_are_hatched() -> None:
+    plan = small_path(target=(15e3, 15e3, 9e7))
+    axs = plan.plot()
+    bad = {sample.index for sample in plan.infeasible}
+    assert bad == {2}
+    for ax in axs:
+        (span,) = artists(ax, "infeasible").values()
+        assert span.get_x() == pytest.approx(1.5)
+        assert span.get_width() == pytest.approx(1.0)
+
+
+def test_tracking_run_is_drawn_over_time() -> None:
+    run = track(small_path(0.1), steps=2, minimum=10.0, maximum=250.0)
+    axs = run.plot()
+    error, stiffness, band, tension = axs
+    np.testing.assert_allclose(line(error, "tip error"), np.c_[run.time, 1e3 * run.tip_error])
+    np.testing.assert_allclose(line(stiffness, "wanted:z")[:, 1], 1e-3 * run.target[:, 0])
+    np.testing.assert_allclose(line(stiffness, "reached:z")[:, 1], 1e-3 * run.stiffness[:, 0])
+    np.testing.assert_allclose(line(band, "displacement")[:, 1], 1e3 * run.displacement)
+    name = run.plan.arm.cables.names[0]
+    np.testing.assert_allclose(line(tension, f"tension:{name}")[:, 1], run.tension[:, 0])
+    require_look(axs)
+
+
+def test_ranges_of_directions_are_drawn_around() -> None:
+    pose = short_arm(STRAND).at(np.full(6, 0.1))
+    ranges = [cdsm.stiffness_range(pose, u, 10.0, 200.0) for u in "yz"]
+    ax = plots.plot_stiffness_ranges({"up to 200 N": ranges})
+    turn, radius = line(ax, "stiffest:up to 200 N").T
+    np.testing.assert_allclose(turn[:2], [0.0, np.pi / 2.0], atol=1e-12)
+    np.testing.assert_allclose(radius[:2], [1e-3 * r.high for r in ranges])
+    np.testing.assert_allclose(line(ax, "softest")[:2, 1], [1e-3 * r.low for r in ranges])
+    with pytest.raises(cdsm.InvalidInput, match="ax: is not polar"):
+        plots.plot_stiffness_ranges({"a": ranges}, ax=Figure().subplots())
+
+
+def test_fit_of_a_tensile_test_is_drawn_over_it() -> None:
+    fit = cdsm.fit_tensile_test(np.linspace(0.0, 5e-3, 50), np.linspace(0.0, 480.0, 50), 0.5)
+    axs = fit.plot()
+    left, right = axs
+    strain, force = line(left, "test").T
+    np.testing.assert_allclose(strain, 100.0 * fit.test.displacement / 0.5)
+    np.testing.assert_allclose(force, fit.test.force)
+    assert np.interp(240.0, *line(left, "fit").T[::-1]) == pytest.approx(0.5, rel=0.05)
+    np.testing.assert_allclose(line(right, "rigidity").T, [fit.tension, 1e-3 * fit.rigidity])
+    require_look(axs)
+
+
+def test_law_of_a_wire_is_drawn_in_kilonewtons() -> None:
+    ax = STRAND.plot()
+    F, EA = line(ax, "tangent").T
+    np.testing.assert_allclose(EA, 1e-3 * np.asarray(STRAND.rigidity(F)))
+    np.testing.assert_allclose(line(ax, "secant")[:, 1], 1e-3 * STRAND.secant_rigidity(F))
+    require_look(ax)
+
+
+def test_identified_stiffness_is_predicted_over_measured() -> None:
+    fit = identified.NOISY
+    axs = fit.plot()
+    points = line(axs[0], "predicted:N/mm")
+    np.testing.assert_allclose(points, 1e-3 * np.c_[fit.measured, fit.predicted])
+    np.testing.assert_allclose(line(axs[-1], "residuals")[:, 1], fit.residuals)
+    require_look(axs)
+
+
+def hinge(friction: float = 0.1) -> cdsm.Manipulator:
+    geometry = cdsm.Geometry.hinged(
+        joints=1, twist=0.0, cables_per_joint=2, link_length=0.15, base_length=0.02,
+        disk_offset=0.02, hole_radius=0.025, link_mass=0.1, lead=0.3, friction=friction,
+    )  # fmt: skip
+    return cdsm.Manipulator(geometry, cdsm.LinearElasticity(48e3))
+
+
+@pytest.fixture(scope="module")
+def loops() -> Identification:
+    loop = WeightLoop(
+        direction="-z", angles=[0.45], forces=[0, 16, 0], minimum=200.0, displacement_std=5e-6
+    )
+    rng = np.random.default_rng(0)
+    return identify(hinge, [loop.simulated(hinge(), rng)], {"friction": (0.0, 0.5)}, progress=False)
+
+
+def test_loops_are_force_over_displacement_along_the_force(loops: Identification) -> None:
+    axs = loops.plot()
+    for name, values in (("predicted", loops.predicted), ("measured", loops.measured)):
+        (gid,) = artists(axs[0], f"{name}:")
+        moved, force = line(axs[0], gid).T
+        np.testing.assert_allclose(force, [0.0, 16.0, 0.0])
+        (axis,) = loops.measurements[0].axes  # type: ignore[union-attr]
+        down = -axis[2] * 1e3 * (values - loops.measured[0])
+        np.testing.assert_allclose(moved, down, atol=1e-12)
+        assert moved[1] > 0.0  # along the weight
+    require_look(axs)
+
+
+@pytest.fixture(scope="module")
+def budget() -> Any:
+    return cdsm.uncertainty(*_uncertain(), direction="z")
+
+
+def _uncertain() -> tuple[cdsm.Posture, cdsm.Tension, cdsm.Tolerances]:
+    pose = short_arm(STRAND).at(np.full(6, 0.1))
+    tolerances = cdsm.Tolerances(rigidity=0.05, tension=1.0)
+    return pose, cdsm.distribute_tension(pose, 40.0), tolerances
+
+
+def test_bars_of_a_budget_are_its_sources(budget: Any) -> None:
+    ax = budget.plot()
+    unit, size = budget.measurand.unit
+    bars = artists(ax, "source:")
+    for source, u in budget.contributions.items():
+        if u:
+            assert bars[f"source:{source.replace('_', ' ')}"].get_width() == pytest.approx(u / size)
+    whole = bars["source:all together"].get_width()
+    assert whole == pytest.approx(budget.standard_uncertainty / size)
+    assert ax.get_xlabel() == f"standard uncertainty [{unit}]"
+    require_look(ax)
+
+
+def test_intervals_of_monte_carlo_stand_where_they_are(budget: Any) -> None:
+    run = cdsm.monte_carlo(*_uncertain(), direction="z", draws=2000, progress=False)
+    ax = run.plot()
+    _, size = budget.measurand.unit
+    for name, interval in (("Monte Carlo", run.interval()), ("first order", budget.interval())):
+        ends = [
+            float(mark.get_xdata()[0]) for mark in ax.lines if mark.get_gid() == f"interval:{name}"
+        ]
+        np.testing.assert_allclose(ends, np.array(interval) / size)
+    require_look(ax)
+
+
+@pytest.mark.parametrize("name", ["fig3", "fig5", "fig8"])
+def test_figures_of_the_paper_are_drawn(name: str) -> None:
+    picture = paper.FIGURES[name]().plot()
+    for ax in panels(picture):
+        if ax.axison:
+            assert ax.lines
+
+
+def test_settings_of_matplotlib_stay_as_they_are(budget: Any) -> None:
+    before = dict(matplotlib.rcParams)
+    axs = Figure(layout="constrained").subplots(1, 2)
+    assert budget.plot(ax=axs[0]) is axs[0]
+    assert list(small_path(0.0).plot(axs, title="two panels")) == list(axs)
+    assert axs[0].get_title(loc="left") == "two panels"
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_each_class_names_the_function_that_draws_it() -> None:
+    for module in pkgutil.walk_packages(cdsm.__path__, "cdsm."):
+        importlib.import_module(module.name)
+    todo, count = Plotted.__subclasses__(), 0
+    for kind in todo:
+        todo += kind.__subclasses__()
+        if "_figure" in vars(kind):
+            count += 1
+            first, second, *_ = inspect.signature(getattr(plots, kind._figure)).parameters.values()
+            assert first.annotation.split(".")[-1] == kind.__name__
+            assert second.name in ("ax", "axs")
+    assert count > 14
+    assert not hasattr(cdsm.stiffness_gradient(cdsm.stiffness(*_balanced())), "plot")
+
+
+def _balanced() -> tuple[cdsm.Posture, cdsm.Tension]:
+    pose = short_arm().at(np.zeros(6))
+    return pose, cdsm.distribute_tension(pose, 20.0)

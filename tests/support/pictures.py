@@ -1,0 +1,93 @@
+"""Read pictures back: artists by their gid, and what every picture keeps to."""
+
+import re
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from cdsm.plots.style import figure_of
+from cdsm.support.values import Array
+
+UNITS = r"\[.+\]|number|sample|factor|candidate|tests|measurement|reading|σ"
+
+
+def panels(picture: Any) -> list[Axes]:
+    """The panels of a picture, one or several."""
+    return list(np.ravel(np.array(picture, dtype=object)))
+
+
+def artists(ax: Axes, start: str) -> dict[str, Any]:
+    """The artists of a panel whose gid begins with ``start``, by gid."""
+    every = ((str(artist.get_gid()), artist) for artist in ax.get_children())
+    return {gid: artist for gid, artist in every if gid.startswith(start)}
+
+
+def line(ax: Axes, gid: str) -> Array:
+    """The points (n, 2) of the line with this gid."""
+    return np.asarray(artists(ax, gid)[gid].get_xydata(), dtype=float)
+
+
+def texts(figure: Figure) -> list[Text]:
+    """The texts of a figure that are seen."""
+    hidden: set[int] = set()
+    for ax in figure.findobj(Axes):
+        assert isinstance(ax, Axes)
+        for axis, limits in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
+            low, high = min(limits), max(limits)
+            room = 1e-9 * (high - low)
+            ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+            # matplotlib keeps ticks beyond the limits, and those of axes that are off
+            unseen = [
+                tick
+                for tick in ticks
+                if not (ax.axison and low - room <= tick.get_loc() <= high + room)
+            ]
+            hidden |= {id(text) for tick in unseen for text in (tick.label1, tick.label2)}
+            if not ax.axison:
+                hidden |= {id(axis.label), id(axis.get_offset_text())}
+    return [
+        text
+        for text in figure.findobj(Text)
+        if isinstance(text, Text)
+        and text.get_visible()
+        and text.get_text().strip()
+        and id(text) not in hidden
+    ]
+
+
+def require_look(picture: Any) -> None:
+    """Units on both axes, three ticks or more, no text over another or outside the figure."""
+    figure = figure_of(picture)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    for ax in panels(picture):
+        if not ax.axison or ax.name != "rectilinear":
+            continue
+        for label in (ax.get_xlabel(), ax.get_ylabel()):
+            assert not label or re.search(UNITS, label), label
+        for axis, limits in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
+            ticks = np.asarray(axis.get_majorticklocs())
+            inside = (ticks >= min(limits) - 1e-9) & (ticks <= max(limits) + 1e-9)
+            whole = np.ptp(limits) < 3.5  # few candidates or readings
+            assert inside.sum() >= (1 if whole else 3) or not ticks.size, ticks
+    boxes = []
+    for text in texts(figure):
+        bounds = Text.get_window_extent(text, renderer)  # without the arrow of an annotation
+        if bounds.width > 0.0:
+            boxes.append((text.get_text(), bounds))
+    page = figure.bbox
+    for words, box in boxes:
+        assert box.x0 > page.x0 - 2.0, words
+        assert box.x1 < page.x1 + 2.0, words
+        assert box.y0 > page.y0 - 2.0, words
+        assert box.y1 < page.y1 + 2.0, words
+    for (first, one), (second, other) in combinations(boxes, 2):
+        wide = min(one.x1, other.x1) - max(one.x0, other.x0)
+        high = min(one.y1, other.y1) - max(one.y0, other.y0)
+        assert not (wide > 1.5 and high > 1.5), f"{first!r} over {second!r}"
