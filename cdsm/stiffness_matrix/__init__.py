@@ -11,5 +11,6 @@ from cdsm.stiffness_matrix.report import Comparison as Comparison
 from cdsm.stiffness_matrix.report import Remedy as Remedy
 from cdsm.stiffness_matrix.report import Report as Report
 from cdsm.stiffness_matrix.shares import Shares as Shares
+from cdsm.stiffness_matrix.spatial import SpatialStiffness as SpatialStiffness
 from cdsm.stiffness_matrix.value import FrictionState as FrictionState
 from cdsm.stiffness_matrix.value import Stiffness as Stiffness

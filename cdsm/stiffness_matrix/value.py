@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm import readings
 from cdsm.errors import InvalidInput, SingularStiffness, listed
@@ -22,6 +22,13 @@ from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints
 from cdsm.stiffness_matrix.report import Report
 from cdsm.stiffness_matrix.shares import Shares
+from cdsm.stiffness_matrix.spatial import (
+    SpatialStiffness,
+    frame_name,
+    invert_scaled,
+    require_six_motions,
+    transform,
+)
 from cdsm.stiffness_matrix.verdict import Verdict, describe_buckling, judge_stiffness
 from cdsm.support.format import coordinates, merged, prepare_json
 from cdsm.support.result import Result, quantity, tabulated, unit, unit_of
@@ -190,6 +197,46 @@ class Stiffness(Result):
         Linear rows first: C_vv [m/N], C_vω [m/(N m)] = [rad/N], C_ωω [rad/(N m)].
         """
         return frozen(readings.compliance(self._inverse, self.posture.jacobian))
+
+    def compliance_at(self, frame: str = "base", at: str | ArrayLike = "tip") -> Array:
+        """Compute the compliance T C Tᵀ (6, 6) in another frame and at another point of the tip.
+
+        T is the 6 × 6 of the lever from the tip to the point, turned into the axes of the frame.
+
+        Args:
+            frame: ``"base"``, or a link, whose axes the rows and columns have.
+            at: ``"tip"``, a link, whose origin is the point, or a point (3,) [m] from the base's
+                origin in base axes. The point moves as if it were fixed to the tip.
+
+        Raises:
+            InvalidInput: There is no such link, or ``at`` is not (3,).
+            SingularStiffness: K_θ is singular.
+        """
+        T, _ = transform(self.posture, frame_name(frame), at)
+        return frozen(T @ self.compliance @ T.T)
+
+    def spatial(self, frame: str = "base", at: str | ArrayLike = "tip") -> SpatialStiffness:
+        """Compute the stiffness of the tip as a matrix (6, 6) in a frame and at a point.
+
+        It is the inverse of :meth:`compliance_at`, which explains the arguments; ``np.asarray`` of
+        the result is the matrix.
+
+        Raises:
+            InvalidInput: There is no such link, or ``at`` is not (3,).
+            SingularStiffness: K_θ is singular, or the tip lacks one of its six motions, which the
+                error names. Rank is judged at 1e-9 with the arm's length as lever.
+        """
+        T, point = transform(self.posture, frame_name(frame), at)
+        require_six_motions(self.posture)
+        tip = invert_scaled(self.compliance, self.posture.arm.length)
+        T_inverse = np.linalg.inv(T)
+        return SpatialStiffness(
+            posture=self.posture,
+            frame=frame,
+            point=point,
+            stiffness=frozen(T_inverse.T @ tip @ T_inverse),
+            compliance=self.compliance_at(frame, at),
+        )
 
     @cached_property
     def cartesian(self) -> Array:
