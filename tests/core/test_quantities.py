@@ -122,7 +122,7 @@ def test_quantities_of_a_batch_are_those_of_posture_and_stiffness() -> None:
     K = cdsm.stiffness(arm.at(Q[0]), np.full(len(arm.cables), 30.0))
     sizes = {"row": 4, "column": 4, "motion": 6, "axis": 3, "joint": arm.nv}
     sizes |= {"cable": len(arm.cables)}
-    methods = {"along", "pseudoinverse"}
+    methods = {"along", "pseudoinverse", "slack"}  # of a stiffness, slack are the names
     for name in {*names_of("batch")} - methods:
         value = getattr(K if hasattr(K, name) else K.posture, name)
         dims = QUANTITIES[name].dims
