@@ -152,7 +152,11 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
         ("minimum = 5.0", "minimum = -5.0", "minimum: -5 N given; cables only pull"),
         ("minimum = 5.0", "minimum = 5.0\nmaximum = 2.0", "maximum: 2 N given, below the minimum"),
         ("minimum = 5.0", "lead = 5.0", "lead: stands outside [universal]"),
-        ('wire = "1x19-1.2mm"', 'wire = "1x19"', "wire: no wire is called '1x19'; did you mean '1x19-1mm'"),
+        (
+            'wire = "1x19-1.2mm"',
+            'wire = "1x19"',
+            "wire: no wire is called '1x19'; did you mean '1x19-1mm'",
+        ),
         ('wire = "1x19-1.2mm"', "wire = {kind = 'linear'}", "wire.rigidity: is missing"),
         ("[cables.cable2_3]", "[cables.cable2_4]", "no cable is called 'cable2_4'; did you mean"),
         ("control =", "contrl =", "cables.cable2_3.contrl: is not a key that is known here; did"),

@@ -184,7 +184,12 @@ CASES: dict[str, tuple[Callable[[], object], str]] = {
     "tensions": (lambda: searched(tension=(5.0,) * 4), r"posture 1.*\(4,\) given, \(6,\)"),
     "domain": (lambda: searched(tension=(900.0,) * 6), "posture 1.*tension 900.*810 N"),
     "way": (lambda: searched(direction=(1, 0, 0), angles=(0.0,) * 3), "posture 1: .*cannot move"),
-    "buckling": (lambda: searched(SOFT, tension=(700.0,) * 6), "posture 1: the arm buckles"),
+    "buckling": (
+        lambda: searched(
+            SOFT, lambda drive: prototype(drive=drive, lead=40.0), tension=(700.0,) * 6
+        ),
+        "posture 1: the arm buckles",
+    ),
     "start": (
         lambda: identify(prototype, EXACT, ONE, start={"hole_radius": 0.1}),
         r"start\['hole_radius'\]: 0.1 is outside",

@@ -97,9 +97,13 @@ def serpentine(kind: str) -> tuple[cdsm.Posture, Array]:
 
 
 def soft() -> tuple[cdsm.Posture, Array]:
-    """Some cables hold their tension, some have springs so soft that L_rest would be negative."""
+    """Some cables hold their tension, some have springs that stretch by much of the cable."""
     pose, pull = serpentine("universal")
-    changes: list[dict[str, Any]] = [{"control": "force"}, {"series_stiffness": 200.0}, {}]
+    changes: list[dict[str, Any]] = [
+        {"control": "force"},
+        {"series_stiffness": 200.0, "lead": 2.0},
+        {},
+    ]
     cables = [replace(cable, **changes[c % 3]) for c, cable in enumerate(pose.arm.cables)]
     return pose.arm.with_cables(cables).at(pose.q), pull
 

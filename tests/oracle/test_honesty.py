@@ -65,6 +65,10 @@ def near(rng: Random, digits: float) -> float:
     return float(rng.choice([-1.0, 1.0]) * 10.0 ** -rng.uniform(0.0, digits))
 
 
+PULLED = 3000.0
+"""Tension [N] up to which the series springs of drawn arms leave wire."""
+
+
 def drawn(rng: Random, spring: float = np.inf) -> cdsm.Manipulator:
     h = rng.uniform(0.006, 0.012)
     sizes: dict[str, Any] = {
@@ -73,7 +77,7 @@ def drawn(rng: Random, spring: float = np.inf) -> cdsm.Manipulator:
         "disk_offset": h,
         "hole_radius": h * rng.uniform(1.5, 4.0),
         "link_mass": rng.choice([0.0, rng.uniform(0.02, 0.5)]),
-        "lead": rng.uniform(0.0, 0.5),
+        "lead": rng.uniform(0.0, 0.5) + PULLED / spring,  # a spring leaves wire
     }
     if rng.random() < 0.6:
         sizes["cables_per_joint"] = int(rng.integers(3, 5))
@@ -124,7 +128,9 @@ def edge_of_buckling(rng: Random) -> Group:
         real = real[(real > 0.0) & (real < 1e6)]
         if real.size:
             row = tension if grows == 0 else wrench
-            row[r] *= real.min() * (1.0 + near(rng, 11.0) * 0.1)
+            edge = row[r] * real.min() * (1.0 + near(rng, 11.0) * 0.1)
+            if grows or edge.max() < PULLED:
+                row[r] = edge
     return Group(arm, q, wrench, tension)
 
 
