@@ -93,10 +93,11 @@ def nondimensional(
     J: Array, torque: Array, low: Array, high: Array, length: float
 ) -> TensionProblem:
     """Scale the balance ``J``ᵀ F = ``torque`` of an arm, without rounding; J_L is (C, nv)."""
-    arm = 2.0 ** math.frexp(abs(J).max())[1]
+    size = abs(J)
+    arm = 2.0 ** math.frexp(size.max())[1]
     A = J.T / arm
     b = torque / arm
-    A[abs(A) < NO_ARM * length / arm] = 0.0
+    A[size.T < NO_ARM * length] = 0.0
     force = 2.0 ** math.frexp(max(abs(b).max(), low.max()))[1]
     return TensionProblem(A, b / force, low / force, high / force, arm, force)
 
@@ -137,7 +138,7 @@ def solve(problem: TensionProblem, solver: str) -> Solution:
         return failed("found no solution with multipliers")
     x = np.asarray(answer.x)
     y = np.asarray(answer.y if basis is None else basis @ answer.y)
-    if not np.isfinite([x.sum(), y.sum()]).all():
+    if not math.isfinite(x.sum() + y.sum()):
         return failed("calls numbers optimal that are not finite")
     least = -(y @ A)  # the optimum but for the bounds
     x = np.where(least <= low, low, np.where(least >= high, high, x))
