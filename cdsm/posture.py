@@ -66,6 +66,15 @@ class Posture(ReadOnlyState):
     spans: Spans
     wrapping: Wrapping | None = None
 
+    def __getstate__(self) -> dict[str, object]:
+        """Return all but what follows from the rest, and holds the rigid body: the contacts."""
+        return {**super().__getstate__(), "wrapping": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        if wraps := state["arm"].wraps:
+            state = {**state, "wrapping": wraps.at(state["twist"], state["placements"])}
+        super().__setstate__(state)
+
     @property
     def routing(self) -> Routing:
         """Cables as polylines through their sites and their contacts with pulleys."""

@@ -1,5 +1,6 @@
 """Paths over pulleys that cannot be: each is refused with the pulley and what to do."""
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -197,3 +198,21 @@ def test_the_table_of_wraps_has_contacts_on_the_pulley() -> None:
     assert chord == pytest.approx(2 * 0.008 * np.sin(table.angle[0] / 2), abs=1e-15)
     assert abs(table.fleet_angles).max() < 1e-15
     assert table.to_dict()["angle_rad"] == pytest.approx(table.angle)
+
+
+def test_postures_are_the_same_after_pickling() -> None:
+    pose = arm_of(FINGER, [START, PULLEY, END]).at([0.05, 0.4])
+    again = pickle.loads(pickle.dumps(pose))
+    np.testing.assert_array_equal(again.wraps.angle, pose.wraps.angle)
+    np.testing.assert_array_equal(again.length_hessian, pose.length_hessian)
+
+
+@pytest.mark.parametrize(
+    ("element", "words"),
+    [(PULLEY, "over the pulley on palm"), (Sheath(0.1), "through a sheath")],
+)
+def test_tolerances_refuse_pulleys_and_sheaths_by_name(element: Any, words: str) -> None:
+    arm = arm_of(FINGER, [START, element, END])
+    pose = arm.with_springs({"to_palm": 1.0, "to_phalanx": 1.0}).at([0.05, 0.4])
+    with pytest.raises(cdsm.InvalidInput, match=f"cable1.*{words}, and tolerances"):
+        cdsm.uncertainty(pose, [5.0], cdsm.Tolerances(rigidity=0.05), direction="z")
