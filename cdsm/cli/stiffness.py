@@ -59,7 +59,8 @@ def show_stiffness(
     robot = options.load_arm(arm, changes)
     wrench = options.load_at_tip(robot, load, mass)
     K, rest = _balanced(robot, wrench, angles, minimum, maximum, tension, pull)
-    head, numbers = header(K.posture, [] if rest else [minimum], tension=K.distribution)
+    friction = "followed along the path" if rest and rest.path else "ignored"
+    head, numbers = header(K.posture, [] if rest else [minimum], friction, K.distribution)
     axes = {axis: options.parse_direction(axis) for axis in ("x", "y", "z")}
     lines = list[str]()
     if direction is not None:

@@ -108,7 +108,7 @@ class TipPosition:
     def rest_posture(self, arm: Manipulator, near: Posture | None = None) -> Posture:
         """Compute where a model of the arm rests, sought from a posture ``near``."""
         (name,) = self._given
-        start = None if near is None else near.q
+        start = None if near is None or arm.has_friction else near.q  # friction: along its path
         motors = {name: getattr(self, name)}
         return forward_statics(arm, **motors, wrench=self.wrench, start=start).pose
 

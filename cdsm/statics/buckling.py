@@ -59,6 +59,12 @@ class _Critical(Result, Plotted):
         shares = ", ".join(f"{names[i]} {self.mode[i]:+.2f}" for i in order[:4])
         return f"softest joint motion: {shares}" + ", …" * (self.mode.size > 4)
 
+    @property
+    def _frictionless(self) -> str:
+        """A line that says that friction is left out, if the holes have it."""
+        left_out = "\nwithout the friction of the holes, with which an arm buckles later"
+        return left_out if self.posture.arm.has_friction else ""
+
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -100,7 +106,7 @@ class CriticalTension(_Critical):
             verdict = f"does not buckle at any lower bound up to {self.examined[1]:.4g} N"
         spans = ", ".join(f"{a:.4g} to {b:.4g} N" for a, b in self.stable if a < b)
         stable = f"stable from {spans}\n" if spans else ""
-        return f"{(self.warnings or (verdict,))[0]}\n{stable}{self._softest()}"
+        return f"{(self.warnings or (verdict,))[0]}\n{stable}{self._softest()}{self._frictionless}"
 
 
 @final
@@ -143,7 +149,7 @@ class CriticalLoad(_Critical):
             "none": "half a million times it was tried",
         }[self.limit]
         part = "no part of it" if none else f"the load up to a factor of {self.factor:.4g}"
-        return f"holds {part}; {reason}\n{self._softest()}"
+        return f"holds {part}; {reason}\n{self._softest()}{self._frictionless}"
 
 
 def critical_tension(
@@ -222,6 +228,8 @@ def critical_load(
     wrench: ArrayLike = NO_WRENCH,
 ) -> CriticalLoad:
     """Compute the factor λ up to which an arm at a fixed posture is stable under λ load + wrench.
+
+    Friction in the holes is left out, and so is what came before: :func:`~cdsm.load_cycle`.
 
     Args:
         pose: The posture, which stays fixed. Tensions are distributed again for every load.

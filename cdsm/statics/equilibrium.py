@@ -26,7 +26,7 @@ from cdsm.stiffness_matrix.verdict import (
     imbalance_of,
     judge,
 )
-from cdsm.support.format import aligned, coordinates, plural, without_rounding
+from cdsm.support.format import aligned, coordinates, merged, plural, prepare_json, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import Direction, instance, unit_direction, wrench_vector
 from cdsm.support.values import Array, draw, frozen
@@ -35,7 +35,13 @@ from cdsm.tension import Tension
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from cdsm.statics.load_cycle import LoadHistory
     from cdsm.stiffness_matrix import Report
+
+FRICTIONLESS = (
+    "without the friction of the holes: with it, where the arm rests depends on what came before"
+)
+"""What a result says of an arm with friction that it leaves out."""
 
 _LISTED = 6  # most joints at stops that a print lists; more are counted
 _LOCKED = 1e6  # a direction is locked if it is so many times stiffer than the softest axis
@@ -64,6 +70,9 @@ class Equilibrium(Result):
         events: What happened on the way there, in the order of the loads: cables that go slack or
             pass their maximum, joints that reach their stops, a loss of stability. Empty if load
             and pull acted at once.
+        path: How an arm with friction in its holes came there: with friction, where it rests
+            depends on it. None: without friction, or motors were locked there.
+        history: The path in words, or that friction was left out; empty for an arm without it.
     """
 
     _headline = "moved"
@@ -78,6 +87,8 @@ class Equilibrium(Result):
     motors: Literal["locked", "tension"] = field(default="locked", metadata=unit("1"))
     branch: float = field(default=1.0, metadata=unit("1"))
     events: tuple[Event, ...] = field(default=(), metadata=unit("1"))
+    path: LoadHistory | None = None
+    history: str = field(default="", metadata=unit("1"))
 
     @property
     def pose(self) -> Posture:
@@ -98,6 +109,21 @@ class Equilibrium(Result):
     def residual(self) -> Array:
         """Residual torque J_Lᵀ F + g − J_Xᵀ W − stop_torque (nv,) [N m]."""
         return frozen(self.stiffness.residual - self.stop_torque)
+
+    @property
+    def jumped(self) -> bool:
+        """Whether the arm jumped or snapped through on the way here."""
+        return self.branch < 1.0 or (self.path is not None and bool(self.path.snaps.any()))
+
+    @property
+    def segment_tension(self) -> Array | None:
+        """T (S,) [N] of the segments of :attr:`Posture.segments`; None without friction."""
+        return self.stiffness.segment_tension
+
+    @property
+    def sliding(self) -> NDArray[np.int8] | None:
+        """Where cables slide now (P,), as :attr:`LoadHistory.sliding`; None without friction."""
+        return None if self.path is None else self.path.sliding[-1]
 
     @quantity("m", "axis")
     def displacement(self) -> Array:
@@ -155,6 +181,8 @@ class Equilibrium(Result):
         if self.branch < 1.0:
             share = f"at {100.0 * self.branch:.4g} % of load and pull its branch of equilibria ends"
             yield Status.MOVED, f"JUMPED: {share}; from there the arm moves to this other one"
+        elif self.jumped:
+            yield Status.MOVED, "SNAPPED: on the way here the arm snapped through"
         if not self.stable:
             yield Status.NEUTRAL, "NEUTRAL: not every joint is brought back"
         elif self.neutral:
@@ -196,13 +224,11 @@ class Equilibrium(Result):
 
     def held_posture(self, forced: NDArray[np.bool_]) -> Posture:
         """Return the posture, of an arm of which the cables ``forced`` (C,) have no stiffness."""
-        if not forced.any():
-            return self.pose
-        pairs = zip(self.pose.arm.cables, forced, strict=True)
-        cables = [
-            replace(cable, control="force") if is_forced else cable for cable, is_forced in pairs
-        ]
-        return self.pose.arm.with_cables(cables).at(self.pose.q, check_limits=False)
+        return with_forced(self.pose, forced)
+
+    def without_friction(self) -> Equilibrium:
+        """Return where the arm would rest without friction, its motors as they are."""
+        return as_equilibrium(self.model, settled(self.model, self.pose))
 
     @property
     def force_controlled(self) -> NDArray[np.bool_]:
@@ -248,8 +274,14 @@ class Equilibrium(Result):
     def report(self) -> Report:
         """Check the stiffness here, as :meth:`Stiffness.report` does.
 
-        Raises InvalidInput if a joint rests on its stop, which K_θ does not know.
+        Raises InvalidInput if a joint rests on its stop, which K_θ does not know, or if cables
+        stick or slide.
         """
+        if self.path is not None:
+            raise InvalidInput(
+                "report",
+                "checks K_θ without friction, and here cables stick or slide; take friction 0.",
+            )
         if self.at_limit:
             problem = "does not know of stops, and"
             raise InvalidInput("report", f"{problem} {listed(self.at_limit)} rests on its own.")
@@ -276,6 +308,18 @@ class Equilibrium(Result):
         texts = [f"{k:.4g}" if k < _LOCKED * least else "locked" for k in values]
         return f"({', '.join(texts)})"
 
+    def to_dict(self) -> dict[str, object]:
+        """Return the numbers in SI for JSON; with friction, those of segments and holes too."""
+        if self.path is None:
+            return super().to_dict()
+        labels = self.path.segment_names
+        followed = {
+            "segment_tension_N": dict(zip(labels, self.path.segment_tensions[-1], strict=True)),
+            "sliding": dict(zip(self.path.holes, self.path.sliding[-1], strict=True)),
+            "snapped": bool(self.path.snaps.any()),
+        }
+        return merged(super().to_dict(), prepare_json(followed))
+
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Plot the arm in mm, with tensions, compliance, load, and its reference if that is near.
 
@@ -294,6 +338,7 @@ class Equilibrium(Result):
             rows.append((cable.name, f"{F:.3f}", f"{F0:.3f}", state))
         moved = coordinates(without_rounding(1000.0 * self.displacement))
         lines = [*aligned(rows), f"tip moved by {moved} mm", *events_text(self.events)]
+        lines += [self.history] if self.history else []
         stopped = np.flatnonzero(self.stop_torque).tolist()
         if len(stopped) > _LISTED:
             lines.append(f"{len(stopped)} of {plural(arm.nv, 'joint')} rest on their stops")
@@ -329,7 +374,8 @@ def equilibrium(
     comes to rest away from the posture that became unstable. Joint limits act as stops.
 
     The whole load acts from the start. If several equilibria exist, slow loading
-    (:func:`~cdsm.weight_test`) may reach another one.
+    (:func:`~cdsm.weight_test`) may reach another one. Friction in the holes is left out, and so is
+    what came before: :func:`~cdsm.load_cycle` follows it.
 
     Args:
         pose: The reference posture, within the joint limits.
@@ -352,6 +398,15 @@ def equilibrium(
     return as_equilibrium(arm, settled(arm, pose))
 
 
+def with_forced(pose: Posture, forced: NDArray[np.bool_]) -> Posture:
+    """Return a posture, of an arm of which the motors of cables ``forced`` (C,) hold tensions."""
+    if not forced.any():
+        return pose
+    pairs = zip(pose.arm.cables, forced, strict=True)
+    cables = [replace(cable, control="force") if is_forced else cable for cable, is_forced in pairs]
+    return pose.arm.with_cables(cables).at(pose.q, check_limits=False)
+
+
 def settled(arm: LockedArm, start: Posture, reached: float = 0.0) -> Point:
     """Return the equilibrium to which an arm descends from the posture ``start``."""
     return settle(Balance(arm.at, arm.reference, arm.at_pose(start)), start.q, reached)
@@ -371,4 +426,5 @@ def as_equilibrium(
         motors="tension" if arm.tension_held or not position.any() else "locked",
         branch=branch,
         events=events,
+        history=FRICTIONLESS if arm.reference.arm.has_friction else "",
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,15 +13,29 @@ from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.continuation import Model, follow, stage_at
-from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, settled
+from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, settled, with_forced
 from cdsm.statics.events import events_on, watched
+from cdsm.statics.load_cycle import Goal, approach
 from cdsm.statics.locked_arm import LockedArm
+from cdsm.statics.quasi_static import QuasiStaticArm
 from cdsm.stiffness_matrix import checked_tension
-from cdsm.support.format import place
-from cdsm.support.validation import NO_WRENCH, instance, one_of, scalar, vector, wrench_vector
-from cdsm.support.values import Array
+from cdsm.support.format import place, plural
+from cdsm.support.validation import (
+    NO_WRENCH,
+    flag,
+    instance,
+    one_of,
+    scalar,
+    vector,
+    wrench_vector,
+)
+from cdsm.support.values import Array, frozen
 
 _HELD = 1e-9  # least stiffness of a joint without load, over the largest
+_FIRST = 1e-3  # share of the pull at which a path with friction begins: at 0 N no cable slides
+_ABOVE = 1.0 + 1e-9  # rounding may put a tension below the low end of its law
+_PULL_STEPS = 8  # of three unequal pulls, the tip is off by 0.5 µm of 270 mm
+_LOAD_STEPS = 16  # of a load on cables that stick, by 0.03 mm
 
 OfCables = ArrayLike | Mapping[str, float]
 """A number for each cable (C,), or numbers by the names of cables; the other cables are loose."""
@@ -34,6 +49,7 @@ def forward_statics(
     pull: OfCables | None = None,
     wrench: ArrayLike = NO_WRENCH,
     start: ArrayLike | None = None,
+    friction: bool = True,
 ) -> Equilibrium:
     """Compute where an arm comes to rest, from what its motors do.
 
@@ -43,6 +59,11 @@ def forward_statics(
     stiffness of their own (k_c = 0); motors that hold lengths are locked, and k_c counts.
     :attr:`Equilibrium.motors` says which: the two stiffnesses of one posture can differ by a factor
     of ten.
+
+    With friction in the holes the rest depends on what came before. Then this path is followed: all
+    motors pull in proportion from nearly nothing, where the arm rests under its weight; then the
+    wrench is hung on (:func:`~cdsm.load_cycle`). ``path`` of the result has both states, and
+    ``history`` says it in words; its stiffness is the tangent while cables go on sliding.
 
     Args:
         arm: The arm.
@@ -55,11 +76,13 @@ def forward_statics(
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         start: Angles q (nv,) [rad] at which the search begins, under the whole load. None: load and
             pull grow from nothing, from the angles q_0; :attr:`Equilibrium.branch` says if the arm
-            jumped on the way.
+            jumped on the way. A start has no history: not with friction.
+        friction: Whether friction in the holes counts. False: where the arm rests without it.
 
     Raises:
         InvalidInput: Not exactly one of the three is given, an argument has the wrong shape, or a
-            cable does not exist; or motors hold lengths, but a cable has the control ``"force"``.
+            cable does not exist; or motors hold lengths, but a cable has the control ``"force"``;
+            or ``start`` is given with friction.
         ElasticityRangeError: Motors hold lengths, and a tension is outside the domain of its law.
         EquilibriumError: No stable equilibrium was found, or nothing holds a joint.
     """
@@ -71,6 +94,13 @@ def forward_statics(
             f"give exactly one of {', '.join(commands)}; {' and '.join(named) or 'none'} given."
         )
         raise InvalidInput("forward_statics", problem)
+    rough = flag("friction", friction) and arm.has_friction
+    if rough and start is not None:
+        raise InvalidInput(
+            "start",
+            "has no history, on which it depends where an arm with friction rests. Leave it out, "
+            "follow the loads by load_cycle, or give friction=False.",
+        )
     W = wrench_vector("wrench", wrench)
     home = arm.at(home_angles(arm))
     begin = home if start is None else arm.at(start)
@@ -79,6 +109,8 @@ def forward_statics(
     if start is not None:
         return as_equilibrium(loaded, settled(loaded, begin))
     _require_held(model(0.0), home)
+    if rough:
+        return _with_friction(model, home, W)
     here = settled(model(0.0), home)
     branch = follow(model, stage_at(model, here.state.pose, here.stop_torque, 0.0), 1.0)
     force = float(np.linalg.norm(W[:3]))
@@ -90,6 +122,64 @@ def forward_statics(
         reached = events[-1].share
         here = settled(loaded, last.pose, reached)
     return as_equilibrium(loaded, here, reached, events)
+
+
+def _with_friction(model: Model, home: Posture, wrench: Array) -> Equilibrium:
+    """Follow an arm with friction: its motors pull, then the ``wrench`` (6,) is hung on."""
+
+    def pulled(share: float) -> LockedArm:
+        return model(share).under(none)
+
+    none = frozen(np.zeros(6))
+    loaded = model(1.0)
+    begin = _first_share(loaded)
+    slack = settled(pulled(0.0), home)
+    stage = follow(pulled, stage_at(pulled, slack.state.pose, slack.stop_torque, 0.0), begin)[-1]
+    point = stage.point if stage.share == begin else settled(pulled(begin), stage.pose)
+    F = frozen(point.state.tension)
+    pose = with_forced(point.state.pose, np.full(F.size, loaded.tension_held))
+    taken = loaded.tension
+    more = np.zeros(F.size)
+    if loaded.rest_length is not None:
+        wire = np.asarray(pulled(begin).rest_length)
+        taken = wire - loaded.rest_length
+        straight = pose.arm.laws.original_lengths(pose.cable_lengths, F)
+        more = np.where(F == 0.0, np.maximum(wire - straight, 0.0), 0.0)
+    goals = [Goal(none, taken, _PULL_STEPS, "the pull")]
+    goals += [Goal(wrench, taken, _LOAD_STEPS, "the load")] if wrench.any() else []
+    arm = QuasiStaticArm(pose, F)
+    path, _ = approach(arm, arm.initial(none, more), goals)
+    rest = home.arm.at(path.angles[-1], check_limits=False)
+    K = path.stiffness(-1)
+    k = frozen(np.where(K.tension > 0.0, K.cable_stiffness, 0.0))
+    wires = rest.cable_lengths if loaded.rest_length is None else loaded.rest_length
+    slides = np.count_nonzero(path.sliding[-1])
+    then = ", then loaded" if wrench.any() else ""
+    history = f"with friction: pulled from slack in {_PULL_STEPS} steps{then}; {slides} of "
+    history += f"{plural(len(path.holes), 'hole')} slide; another history ends elsewhere"
+    return Equilibrium(
+        reference=loaded.reference,
+        reference_tension=loaded.tension,
+        stiffness=replace(K, posture=rest, cable_stiffness=k, free_length=wires),
+        stop_torque=frozen(path.stop_torque[-1].copy()),
+        model=loaded,
+        motors="tension" if loaded.tension_held else "locked",
+        path=path,
+        history=history,
+    )
+
+
+def _first_share(loaded: LockedArm) -> float:
+    """Return the share of the pull from which the path is followed.
+
+    Motors that hold tensions begin within the laws of their wires, which segments between holes
+    need.
+    """
+    if not loaded.tension_held:
+        return _FIRST
+    pairs = zip(loaded.reference.arm.cables, loaded.tension, strict=True)
+    lows = [cable.elasticity.low / F for cable, F in pairs if F > 0.0 and any(cable.friction)]
+    return float(min(1.0, max([_FIRST, *(low * _ABOVE for low in lows)])))
 
 
 def home_angles(arm: Manipulator) -> Array:

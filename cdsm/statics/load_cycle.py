@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,13 @@ from cdsm.friction.capstan import assemble_segments
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
-from cdsm.statics.quasi_static import NO_PATH, EquilibriumPath, Load, QuasiStaticArm
+from cdsm.statics.quasi_static import (
+    NO_PATH,
+    EquilibriumPath,
+    Load,
+    QuasiStaticArm,
+    QuasiStaticState,
+)
 from cdsm.stiffness_matrix import FrictionState, Stiffness, checked_tension
 from cdsm.support.files import write_file
 from cdsm.support.format import without_rounding
@@ -42,7 +48,8 @@ class LoadHistory(Result, Plotted):
 
     Attributes:
         reference: Posture at which the motors were locked.
-        reference_tension: F (C,) [N] at the reference, the same in all segments of a cable.
+        reference_tension: F (C,) [N] at the reference, the same in all segments of a cable; if the
+            cycle goes on from a rest with friction, F at the motors.
         reference_wrench: W at the reference (6,): force [N], then moment [N m].
         load: Number of each load (n,), from 0: its row in ``wrenches``.
         wrenches: W at each load (n, 6): force [N], then moment [N m].
@@ -117,6 +124,14 @@ class LoadHistory(Result, Plotted):
         pairs = zip(chains.cable[chains.hole], chains.site, strict=True)
         return tuple(f"{names[c]} site {site + 1}" for c, site in pairs)
 
+    @property
+    def segment_names(self) -> tuple[str, ...]:
+        """Name of each segment (S,): its cable, and its number from the actuator."""
+        chains = self.reference.segments.chains
+        names = self.reference.arm.cables.names
+        pairs = zip(chains.cable, np.arange(chains.cable.size), strict=True)
+        return tuple(f"{names[c]} segment {s - chains.start[c] + 1}" for c, s in pairs)
+
     def pose(self, load: int) -> Posture:
         """Return the posture at a load, by its number in :attr:`load`; −1 is the last load.
 
@@ -171,11 +186,7 @@ class LoadHistory(Result, Plotted):
         return "\n".join(rows)
 
     def _labels(self) -> dict[str, Sequence[object]]:
-        chains = self.reference.segments.chains
-        names = self.reference.arm.cables.names
-        pairs = zip(chains.cable, np.arange(chains.cable.size), strict=True)
-        segments = [f"{names[c]} segment {s - chains.start[c] + 1}" for c, s in pairs]
-        return {**super()._labels(), "hole": self.holes, "segment": segments}
+        return {**super()._labels(), "hole": self.holes, "segment": self.segment_names}
 
     def _index(self, load: int) -> int:
         count = len(self.load)
@@ -197,9 +208,9 @@ def load_cycle(
     hole j, which bends the cable by φ_j, |ln T_{j+1} − ln T_j| ≤ μ φ_j with the friction
     coefficient μ. Wire moves through a hole only at this bound, towards the larger tension. So each
     state depends on all earlier loads. The first state is the reference, with one tension in all
-    segments of a cable, as after shaking the arm. Between two loads the wrench and the commands
-    change linearly and slowly, without inertia. Joint limits are stops. Without friction each load
-    gives the :func:`~cdsm.equilibrium`.
+    segments of a cable, as after shaking the arm; or a rest with friction, whose history goes on.
+    Between two loads the wrench and the commands change linearly and slowly, without inertia.
+    Joint limits are stops. Without friction each load gives the :func:`~cdsm.equilibrium`.
 
     In rare cases several postures are in equilibrium. Then the result is the one that the search
     from the previous posture finds.
@@ -209,7 +220,8 @@ def load_cycle(
         tension: F at the reference: the result of :func:`~cdsm.distribute_tension`, or other
             tensions (C,) [N]. If they do not balance the arm, it settles on the way to the first
             load. Or an :class:`Equilibrium` with this posture, as of :func:`~cdsm.forward_statics`:
-            its motors go on holding the tensions, or the lengths, of slack cables too.
+            its motors go on holding the tensions, or the lengths, of slack cables too; if it has a
+            ``path``, the segments begin with the tensions that friction left them.
         wrenches: W of each load (n, 6) at ``tool0`` in base axes: force [N], then moment [N m].
             Before the first load the wrench is that of the ``Tension``, or zero.
         motors: Commands of the motors at each load (n, C): for a position-controlled cable the rest
@@ -246,12 +258,14 @@ def follow_loads(
     steps.
     """
     slack = np.zeros(len(instance("pose", pose, Posture).arm.cables))
+    T: Array | None = None
     if isinstance(tension, Equilibrium):
         rest = tension.resumed(pose, None)
         pose = rest.held_posture(rest.force_controlled)
         F = rest.tension
         W = rest.wrench
         slack = rest.paid_out
+        T = rest.stiffness.segment_tension
     else:
         F, W = checked_tension(pose, tension, None)
     pose.arm.laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
@@ -263,19 +277,46 @@ def follow_loads(
         )
     substeps = whole_number("substeps", substeps, 1, 1000)
     arm = QuasiStaticArm(pose, F)
-    state = arm.initial(W, slack)
-    none = np.zeros(pose.q.size)
+    state = arm.initial(W, slack, T)
     commands = np.tile(state.load.motors, (len(loads), 1))
     if motors is not None:
         wire = np.add.reduceat(state.arm_state.chain.rest_length, arm.start[:-1])
         commands = _commands(motors, pose, commands.shape, wire)
+    goals = [
+        Goal(wrench, command, substeps, f"the step to load {k}")
+        for k, (wrench, command) in enumerate(zip(loads, commands, strict=True))
+    ]
+    return approach(arm, state, goals, near)
+
+
+class Goal(NamedTuple):
+    """A load, and how it is approached."""
+
+    wrench: Array  # W (6,): force [N], then moment [N m]
+    motors: Array  # commands (C,), as those of a LoadHistory
+    substeps: int  # number of equal steps on the way
+    what: str  # name of the way, in errors
+
+
+def approach(
+    arm: QuasiStaticArm,
+    start: QuasiStaticState,
+    goals: Sequence[Goal],
+    near: Sequence[EquilibriumPath] = (),
+) -> tuple[LoadHistory, tuple[EquilibriumPath, ...]]:
+    """Load an arm slowly from one goal to the next, from a state at its reference.
+
+    ``near`` is as in :func:`follow_loads`.
+    """
+    pose = arm.reference
+    none = np.zeros(pose.q.size)
     states = []
     steps = []
-    pairs = tuple(zip(loads, commands, strict=True))
-    for k, (wrench, command) in enumerate(show_progress(pairs, "loads")):
-        goal = Load(wrench, none, command)
+    state = start
+    for k, goal in enumerate(show_progress(goals, "loads")):
+        load = Load(goal.wrench, none, goal.motors)
         known = near[k] if near else NO_PATH
-        state, step = arm.step_to(state, goal, substeps, f"the step to load {k}", known)
+        state, step = arm.step_to(state, load, goal.substeps, goal.what, known)
         states.append(state)
         steps.append(step)
     hole = pose.segments.chains.hole
@@ -284,11 +325,11 @@ def follow_loads(
     last = np.array([arm_state.chain.slip[hole] for arm_state in arms])
     history = LoadHistory(
         reference=pose,
-        reference_tension=F,
-        reference_wrench=W,
-        load=frozen(np.arange(len(loads))),
-        wrenches=frozen(loads),
-        motors=frozen(commands),
+        reference_tension=arm.tension,
+        reference_wrench=start.load.wrench,
+        load=frozen(np.arange(len(goals))),
+        wrenches=frozen(np.array([goal.wrench for goal in goals])),
+        motors=frozen(np.array([goal.motors for goal in goals])),
         angles=frozen(np.array([arm_state.pose.q for arm_state in arms])),
         tip=frozen(np.array([arm_state.pose.tip[:3, 3] for arm_state in arms])),
         segment_tensions=frozen(np.array([arm_state.chain.tension for arm_state in arms])),

@@ -79,19 +79,22 @@ class QuasiStaticArm:
         arm.checked_angles(reference.q)  # within the joint limits
         LockedArm(reference, tension, np.zeros(6))  # refuses a spring that leaves no wire
         self.reference = reference
-        self._tension = tension
+        self.tension = tension
         self.start = reference.segments.chains.start
         self.forced = ~arm.cables.position_controlled
         self._problem = ChainProblem(arm.cables, self.start)
 
-    def initial(self, wrench: Array, slack: Array | float = 0.0) -> QuasiStaticState:
-        """Return the state at the reference under ``wrench`` (6,), with even tensions.
+    def initial(
+        self, wrench: Array, slack: Array | float = 0.0, tension: Array | None = None
+    ) -> QuasiStaticState:
+        """Return the state at the reference under ``wrench`` (6,).
 
-        ``slack`` (C,) [m] is how much longer than straight the wires are.
+        ``slack`` (C,) [m] is how much longer than straight the wires are. ``tension`` (S,) [N] are
+        the tensions of the segments; None: even ones.
         """
         pose = self.reference
-        motors = np.where(self.forced, self._tension, 0.0)
-        T = self._tension[pose.segments.chains.cable]
+        motors = np.where(self.forced, self.tension, 0.0)
+        T = self.tension[pose.segments.chains.cable] if tension is None else tension
         none = np.zeros(pose.q.size)
         rest_length = np.array(self._problem.rest_lengths(pose.segments.lengths, T))
         rest_length[self.start[:-1]] += slack

@@ -43,7 +43,8 @@ class WeightTest(Result, Plotted):
         unloaded: Equilibrium without the weight, under the wrench that also acts then.
         states: Equilibrium at each step; the last one is under the full load.
         breakaway: Load in the direction of the weight below which no cable slides, and the hole
-            that slides first; None for an arm without friction.
+            that slides first; None for an arm without friction, and if the test goes on from a
+            rest with friction: there some cables are about to slide already.
         history: States with friction; load 0 is the arm without the weight. None without friction.
         events: What changes how the arm carries the weight, in the order of the loads; with
             friction where there is some.
@@ -122,7 +123,7 @@ class WeightTest(Result, Plotted):
 
     @quantity("N")
     def breakaway_load(self) -> float | None:
-        """Weight [N] below which no cable slides, to first order; None without friction."""
+        """Weight [N] below which no cable slides, to first order; or None as ``breakaway``."""
         return self.breakaway.load if self.breakaway else None
 
     @quantity("N")
@@ -198,8 +199,16 @@ class WeightTest(Result, Plotted):
 
     def _about_friction(self) -> list[str]:
         """Say which weights measure which stiffness."""
-        if self.history is None or self.stuck is None:
+        if self.history is None:
             return []
+        sliding = np.count_nonzero(self.history.sliding[-1])
+        slide = f"{sliding} of {plural(len(self.history.holes), 'hole')} slide"
+        if self.stuck is None:
+            goes_on = "the weight goes on from a rest with friction; under the full one"
+            return [
+                f"{goes_on} {slide}; without friction it would measure "
+                f"{self.frictionless / 1e3:.4g} N/mm"
+            ]
         if self.breakaway_load == 0.0:
             reason = "friction holds no cable here: "
             return [f"{reason}one is slack, or the cables go straight through all holes"]
@@ -207,13 +216,12 @@ class WeightTest(Result, Plotted):
         slides += f"{100.0 * (SLIDING - 1.0):.0f} % above that of the same load without friction"
         if self.sliding_load == math.inf:
             slides = "under this weight the arm does not slide yet: hang more"
-        sliding = np.count_nonzero(self.history.sliding[-1]), len(self.history.holes)
         return [
             f"below {self.breakaway_load:.4g} N all cables stick: a weight measures "
             f"{self.stuck / 1e3:.4g} N/mm",
             slides,
             f"this weight, {self.loads[-1]:.4g} N, measures {self.stiffness / 1e3:.4g} N/mm; "
-            f"{sliding[0]} of {plural(sliding[1], 'hole')} slide",
+            f"{slide}",
             "so take the difference of two weights with which they slide, and compare it with "
             "theirs without friction; this weight alone would measure "
             f"{self.frictionless / 1e3:.4g} N/mm without friction",
@@ -240,7 +248,8 @@ def weight_test(
         tension: F at the reference, as for :func:`~cdsm.equilibrium`. If these tensions do not
             balance the arm, the test starts from the equilibrium they lead to. Or an
             :class:`Equilibrium` with this posture, as of :func:`~cdsm.forward_statics`: the test
-            starts there, and its motors go on holding the tensions, or the lengths.
+            starts there, and its motors go on holding the tensions, or the lengths. With friction
+            its history goes on, and the states without it are those of the same motors.
         force: ΔF (3,) [N] at ``tool0`` in base axes, added to ``wrench``.
         steps: Number of equal load steps, at most 1000.
         wrench: Wrench (6,) without the weight: force [N], then moment [N m]. Default: the wrench of
@@ -261,9 +270,12 @@ def weight_test(
     if isinstance(tension, Equilibrium):
         unloaded = tension.resumed(pose, wrench)
         held = unloaded.held_posture(unloaded.force_controlled)
+        followed = unloaded.path is not None
+        unloaded = unloaded.without_friction() if followed else unloaded
     else:
         unloaded = equilibrium(pose, tension, wrench)
         held = pose
+        followed = False
     states = [unloaded]
     added = np.append(force, np.zeros(3))
     W = unloaded.wrench
@@ -290,11 +302,12 @@ def weight_test(
         raise InvalidInput("force", f"{problem}{_MEASURED * pose.arm.length * test.tangent:.1g} N.")
     if not pose.arm.has_friction:
         return test
+    first = None if followed else breakaway(held, unloaded.reference_tension, force, W)
     return WeightTest(
         force=force,
         unloaded=unloaded,
         states=test.states,
-        breakaway=breakaway(held, unloaded.reference_tension, force, W),
+        breakaway=first,
         history=load_cycle(pose, tension, W + np.arange(steps + 1)[:, None] / steps * added),
     )
 

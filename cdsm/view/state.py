@@ -162,10 +162,12 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
         force = np.concatenate([setting.force, np.zeros(3)])
         if setting.pull is not None:
             rest = cdsm.forward_statics(arm, pull=setting.pull, wrench=force)
-            results |= {"rest": rest, "stiffness": rest.stiffness}
-            status = Status.OK if rest.branch == 1.0 else Status.MOVED
+            slides = None if rest.sliding is None else rest.sliding != 0
+            results |= {"rest": rest, "stiffness": rest.stiffness, "sliding": slides}
+            status = Status.MOVED if rest.jumped else Status.OK
             status = Status.NEUTRAL if rest.neutral or not rest.stable else status
-            warnings = "\n".join([*rest.warnings, *rest.pose.remarks])
+            history = [rest.history] if rest.history else []
+            warnings = "\n".join([*rest.warnings, *history, *rest.pose.remarks])
             return Shown(**results, status=status, problem=warnings)
         wrench = force * (not setting.sag)
         tension = distribute_tension(pose, setting.minimum, setting.maximum, wrench)
