@@ -68,7 +68,7 @@ SURFACE = 1e-9
 Rounding of √(R² − r²) would be as long, and its direction would be noise.
 """
 
-_STILL = 1e-13  # motion of the contacts in a sweep [m] at which they have settled
+_STILL = 1e-13  # motion of the contacts [m] that is still to come when they count as settled
 _SWEEPS = 500  # smooth pulleys that nearly touch each other needed 155 of them
 
 
@@ -271,14 +271,18 @@ def settle(
                 arrival[i][k] = centre[i][k]
                 departure[i][k] = centre[i][k]
 
-        # solve pulley after pulley until no contact moves; one that is left alone, at once
-        moved = 0.0
+        # solve pulley after pulley until no contact will move; one that is left alone, at once
+        before = 0.0
         outcome = TOUCHES
         culprit = low
+        settled = count <= 1
         for _ in range(_SWEEPS if count > 1 else 1):
             moved, outcome, culprit = _sweep(True, start, end, low, high, pulleys, at)
-            if moved < _STILL:
+            # motions fall by this sweep's ratio at least, or by its square in the plane
+            if moved < _STILL or moved * moved < _STILL * before:
+                settled = True
                 break
+            before = moved
 
         # leave out the pulley that would have to pull most
         worst = -1
@@ -293,7 +297,7 @@ def settle(
             continue
         if outcome != TOUCHES:
             return outcome, culprit
-        if count > 1 and moved >= _STILL:
+        if not settled:
             return UNSETTLED, culprit
         if count == high - low:
             return TOUCHES, low

@@ -159,7 +159,7 @@ class Wraps:
         points += contacts.departure
         node = np.array([points[i] for i in pattern.source]).T
         spans = pattern.routing.spans(twist, node)
-        if spans.length.min(initial=math.inf) < SHORTEST_SEGMENT:
+        if spans.length.size and spans.length.min() < SHORTEST_SEGMENT:
             raise self._coincident(pattern, int(spans.length.argmin()))
         # arcs: r Φ in a groove, r Φ/cos γ on a helix
         radii, *_ = self._constants
