@@ -8,6 +8,7 @@ angle q_0 by k (θ − q_0).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +20,8 @@ from lxml import etree
 from cdsm.errors import GeometryError, InvalidInput, listed
 from cdsm.support.validation import one_of, scalar, within
 from cdsm.support.values import Array, frozen
+
+_LOGGED = math.radians(1.0)  # largest error of a logged follower [rad]
 
 
 class Mimic(NamedTuple):
@@ -115,6 +118,30 @@ def limits_of(
         problem += f"its own limits only where {leader} is beyond its limits. Change a limit, or "
         raise GeometryError(f"{problem}multiplier or offset of the <mimic>.")
     return CoupledLimits(frozen(low), frozen(high), tuple(narrowing))
+
+
+def require_followers(
+    coupling: Coupling | None, names: Sequence[str], q: Array, logged: Mapping[str, Array]
+) -> None:
+    """Raise InvalidInput if a logged follower is not where its leader puts it, within 1°.
+
+    ``q`` are the angles (S, nv) of the independent joints, ``logged`` those (S,) of followers.
+    """
+    if coupling is None or not logged:
+        return
+    angles = coupling.angles(q)
+    for name, values in logged.items():
+        i = names.index(name)
+        expected = angles[:, i]
+        off = abs(values - expected)
+        k = int(off.argmax())
+        if off[k] > _LOGGED:
+            leader = names[coupling.leaders[int(abs(coupling.matrix[i]).argmax())]]
+            problem = (
+                f"reading {k + 1}: {values[k]:.4g} given, but {leader}, which it mimics, puts "
+            )
+            remedy = f"it at {expected[k]:.4g} [rad, m]. Leave the column out, or correct <mimic>."
+            raise InvalidInput(name, problem + remedy)
 
 
 Spring = float | Sequence[float]

@@ -17,9 +17,12 @@ from cdsm.cli import options
 from cdsm.cli.options import FigureOption, JsonOption, file_opt, opt
 from cdsm.cli.output import answer, misuse, write, write_picture
 
+_TEST = "Tensile test, a line per reading. Columns: displacement (or extension, stroke, strain, …) "
+_TEST += "[mm] and force (or load) [N], in the order recorded; as examples/data/TEST.csv."
+
 
 def fit(
-    test: Annotated[Path, typer.Argument(metavar="TEST.csv", help="Tensile test to read.")],
+    test: Annotated[Path, typer.Argument(metavar="TEST.csv", help=_TEST)],
     gauge_length: Annotated[
         float | None, opt("Length of the wire, if not in the file.", "MM")
     ] = None,
@@ -74,7 +77,8 @@ def _pair(option: str, text: str | None) -> list[str] | None:
 Limits = tuple[float, float]
 
 _LOOPS = "A line per reading. Columns: test; joints [deg]; direction (such as -z); force [N]; "
-_LOOPS += "displacement [mm] along it (or x, y, z); minimum [N], or a tension per cable [N]."
+_LOOPS += "displacement [mm] along it (or x, y, z); minimum [N], or a tension per cable [N]; as "
+_LOOPS += "examples/data/LOOPS.csv."
 _FREE = "Parameter to find; repeat it: friction; rigidity (factor on EA); spring [N/mm] in series; "
 _FREE += "lead, hole_radius, disk_offset, link_length [mm]; link_mass [g]; joint_stiffness, "
 _FREE += "bending_stiffness [N m/rad, N m²]. Default bounds: half to "

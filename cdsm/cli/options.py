@@ -48,10 +48,11 @@ _SET = "Change a key of ARM.toml for this run: minimum=50, wire=48e3, friction=0
 _SET += "universal.link_mass=0.06, cables.cable1_1.maximum=90. Repeat it."
 _ANGLES = "Joint angles [deg, or mm where a joint slides]: one for all, one each, or by name "
 _ANGLES += "(joint2_1=10,…; others 0). Default: 0."
-OF_JOINTS = "Path, a line per sample. Columns such as joint1_1 [deg]; mm where they slide; "
-OF_JOINTS += "others 0."
+OF_SWEEP = "Path, a line per sample. Columns such as joint1_1 [deg] (mm where they slide; others "
+OF_SWEEP += "0), or x [mm], y [mm], z [mm] of the tip; as examples/data/PATH.csv, TIP_PATH.csv."
 _PATH = "Path, a line per sample. Columns such as joint1_1 [deg] (mm where they slide; others 0), "
-_PATH += "or x [mm], y [mm], z [mm] of the tip; for plans also target [N/mm]."
+_PATH += "or x [mm], y [mm], z [mm] of the tip; for plans also target [N/mm]; as "
+_PATH += "examples/data/PATH.csv, TIP_PATH.csv."
 
 ArmArgument = Annotated[
     Path, typer.Argument(metavar="ARM.toml", help="The arm; `cdsm new` writes one.")
@@ -226,21 +227,27 @@ class Motion(NamedTuple):
     target: Array | None = None  # wanted stiffness (S,) [N/m]; None without such a column
 
 
-def read_path(path: Path, arm: cdsm.Manipulator) -> Motion:
+def read_path(path: Path, arm: cdsm.Manipulator, *, target: bool = True) -> Motion:
     """Read --path, a CSV file: a header of names with units, then one line per sample.
 
-    Joints without a column stay at 0. Other columns are ignored, unless their names look like
-    typing errors: then FileError is raised, as for a wrong unit.
+    Joints without a column stay at 0. Columns of joints that follow others are checked. Other
+    columns are ignored, unless their names have a meaning that is not read here (``target`` says
+    whether a wanted stiffness is), or look like typing errors: then FileError is raised, as for a
+    wrong unit.
     """
     import numpy as np
 
+    from cdsm.joints import require_followers
     from cdsm.support.tables import ANGLE, Columns
 
     length = {"mm": 1e-3, "m": 1.0}
     pairs = zip(arm.joint_names, arm.slides, strict=True)
     units = {name: length if slides else ANGLE for name, slides in pairs}
-    units |= dict.fromkeys("xyz", length) | {"target": {"N/mm": 1e3, "N/m": 1.0}}
-    table = Columns(path, units, "samples")
+    followers = [name for name in arm.body.all_joints if name not in units]
+    units |= dict.fromkeys(followers, ANGLE | length) | dict.fromkeys("xyz", length)
+    if target:
+        units |= {"target": {"N/mm": 1e3, "N/m": 1.0}}
+    table = Columns(path, units, "samples", arm.cables.names)
 
     def column(name: str) -> Array:
         return np.array([table.number(row, name) for row in table.rows])
@@ -252,9 +259,14 @@ def read_path(path: Path, arm: cdsm.Manipulator) -> Motion:
             f"has columns for {'both' if has_tips else 'neither'} of joint angles ({first}, …) and "
             "tip positions (x [mm], y [mm], z [mm]); give one of them"
         )
-    target = column("target") if "target" in table else None
+    wanted = column("target") if "target" in table else None
     if has_tips:
-        return Motion(tips=np.transpose([column(name) for name in "xyz"]), target=target)
+        return Motion(tips=np.transpose([column(name) for name in "xyz"]), target=wanted)
     rest = np.zeros(len(table.rows))
-    joints = [column(name) if name in table else rest for name in arm.joint_names]
-    return Motion(angles=np.transpose(joints), target=target)
+    angles = np.transpose([column(name) if name in table else rest for name in arm.joint_names])
+    logged = {name: column(name) for name in followers if name in table}
+    try:
+        require_followers(arm.body.coupling, arm.body.all_joints, angles, logged)
+    except cdsm.InvalidInput as error:
+        raise cdsm.FileError(path, str(error)) from None
+    return Motion(angles=angles, target=wanted)

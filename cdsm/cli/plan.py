@@ -127,7 +127,7 @@ def sweep_postures(
     changes: options.SetOption = None,
     angles: options.AnglesOption = None,
     grid: Annotated[str | None, opt(_GRID, "JOINT=LOW:HIGH:N,...")] = None,
-    path: Annotated[Path | None, opt(options.OF_JOINTS, "PATH.csv")] = None,
+    path: Annotated[Path | None, opt(options.OF_SWEEP, "PATH.csv")] = None,
     random: Annotated[int | None, opt("Sobol points within the joint limits.", "N", min=1)] = None,
     minimum: Annotated[str, opt(_MINIMA, "N,...")] = "0",
     maximum: options.MaximumOption = math.inf,
@@ -260,11 +260,29 @@ def _postures(
     if grid is not None:
         return _grid(grid, arm)
     if path is not None:
-        file = options.read_path(path, arm)
-        if file.angles is None:
-            raise cdsm.FileError(path, "has tips; a sweep needs joint angles.")
-        return cdsm.PathPoses(file.angles)
+        motion = options.read_path(path, arm, target=False)
+        q = motion.angles
+        if q is None:
+            q = _angles_of_tips(arm, motion.tips, path)
+        return cdsm.PathPoses(q) if len(q) > 1 else q
     return cdsm.RandomPoses(random or 0)
+
+
+def _angles_of_tips(arm: cdsm.Manipulator, tips: Array | None, path: Path) -> Array:
+    """Return joint angles (S, nv) at tip positions (S, 3) [m], each nearest to those before."""
+    import numpy as np
+
+    angles: list[Array] = []
+    for k, tip in enumerate(() if tips is None else tips):
+        solution = cdsm.inverse_kinematics(arm, tip, angles[-1] if angles else None)
+        if not solution.reachable:
+            place = ", ".join(f"{1e3 * value:.4g}" for value in tip)
+            nearest = f"the tip comes no nearer than {1e3 * solution.position_error:.3g} mm"
+            stops = f" ({', '.join(solution.at_limit)} at limit)" if solution.at_limit else ""
+            problem = f"sample {k + 1}: ({place}) mm is out of reach, {nearest}{stops}."
+            raise cdsm.FileError(path, problem)
+        angles.append(solution.angles)
+    return np.array(angles)
 
 
 def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:

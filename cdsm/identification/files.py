@@ -12,12 +12,14 @@ from numpy.typing import ArrayLike
 from cdsm.errors import FileError, InvalidInput
 from cdsm.identification.measurement import WeightLoop
 from cdsm.identification.tip_position import TipPosition
+from cdsm.joints import require_followers
 from cdsm.manipulator import Manipulator
 from cdsm.support.tables import ANGLE, Columns, Row
 from cdsm.support.validation import AXES, instance
 
 _LENGTH: Final = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
 _FORCE: Final = {"N": 1.0}
+_MASS: Final = {"kg": 1.0, "g": 1e-3}
 _TEXT: Final[dict[str, float]] = {}
 
 
@@ -34,7 +36,8 @@ def read_loops(
 
     - ``test``: name of the loop; its lines are consecutive, in the order of the forces.
     - A column per joint, such as ``joint1_1 [deg]`` or ``[rad]``; ``[mm]`` or ``[m]`` for prismatic
-      joints: the angle before the first force. A joint without a column is at 0.
+      joints: the angle before the first force. A joint without a column is at 0. A column of a
+      joint that mimics another one is checked.
     - ``direction``: direction of the forces, an axis such as ``-z``.
     - ``force [N]``: force along the direction, 0 where nothing hangs.
     - ``displacement [mm]``: reading along the direction; or ``x [mm]``, ``y [mm]`` and ``z [mm]``.
@@ -43,9 +46,9 @@ def read_loops(
       ``minimum [N]``: the lower bound with which the tensions are distributed.
 
     A cell of a joint, a cable, ``direction`` or ``minimum`` may be empty after the first line of a
-    test. Lines that begin with # are ignored. Columns with other names are ignored too, unless a
-    name looks like a misspelling of one of these names, or like a joint or cable that the arm does
-    not have: that is an error.
+    test. Lines that begin with # are ignored. Columns with other names are ignored too. But a name
+    that looks like a misspelling of one of these names, or like a joint or cable that the arm does
+    not have, and one that would change the answer, such as ``mass``, are errors.
 
     Args:
         path: The file.
@@ -63,6 +66,8 @@ def read_loops(
     units = {"test": _TEXT, "direction": _TEXT, "force": _FORCE, "minimum": _FORCE}
     units |= dict.fromkeys(("displacement", *"xyz"), _LENGTH) | dict.fromkeys(cables, _FORCE)
     units |= zip(joints, (_LENGTH if slides else ANGLE for slides in arm.slides), strict=True)
+    followers = [name for name in arm.body.all_joints if name not in joints]
+    units |= dict.fromkeys(followers, ANGLE | _LENGTH)
     table = Columns(path, units, "loops")
     refuse = table.refuse
     text = table.text
@@ -91,9 +96,12 @@ def read_loops(
                 f"test {label}: its readings span {moved:.4g} m, more than the arm is long, "
                 f"{arm.length:.4g} m; give the unit in which they were read"
             )
+        angles = tuple(number(fixed(rows, q), q) if q in table else 0.0 for q in joints)
+        logged = {q: np.array([number(fixed(rows, q), q)]) for q in followers if q in table}
+        require_followers(arm.body.coupling, arm.body.all_joints, np.array([angles]), logged)
         return WeightLoop(
             direction=AXES[direction],
-            angles=tuple(number(fixed(rows, q), q) if q in table else 0.0 for q in joints),
+            angles=angles,
             forces=tuple(number(row, "force") for row in rows),
             displacements=(read[:, 0] if len(readings) == 1 else read) if readings else None,  # type: ignore[arg-type]
             tension=tuple(before) if tensions and tensions != ["minimum"] else None,
@@ -145,10 +153,13 @@ def read_tip_positions(
     - ``x [mm]``, ``y [mm]``, ``z [mm]``, one or more: the coordinates, in mm, um or m.
     - A column per cable, such as ``cable1_1 [mm]``: the pull; or ``cable1_1 [N]``, the tension, but
       not both in one file. A cable without a column, or with an empty cell, is loose.
+    - Optional: the load at the tip, ``force [N]`` along ``direction``, an axis such as ``-z``; and
+      ``mass [kg]`` that hangs there. An empty cell is no load.
     - Optional: ``label``.
 
     An empty cell of a coordinate was not measured. Lines that begin with # and columns with other
-    names are ignored, unless a name looks like a misspelling of one of these.
+    names are ignored. But a name that looks like a misspelling of one of these, and one that would
+    change the answer, such as ``moment`` or ``minimum``, are errors.
 
     Args:
         path: The file.
@@ -162,6 +173,7 @@ def read_tip_positions(
     """
     names = instance("arm", arm, Manipulator).cables.names
     units = {"label": _TEXT} | dict.fromkeys("xyz", _LENGTH) | dict.fromkeys(names, _LENGTH)
+    units |= {"direction": _TEXT, "force": _FORCE, "mass": _MASS}
     table = Columns(path, units, "positions")
     axes, cables = ([name for name in group if name in table] for group in ("xyz", names))
     if not axes or not cables:
@@ -169,8 +181,27 @@ def read_tip_positions(
     motors = "tension" if table.unit[cables[0]] in _FORCE else "pull"
     if motors == "tension":
         table.units |= dict.fromkeys(cables, _FORCE)
-    for name in (*axes, *cables):
+    loads = [name for name in ("force", "mass") if name in table]
+    for name in (*axes, *cables, *loads):
         table.factor(name)
+    if ("force" in table) != ("direction" in table):
+        table.refuse("needs both columns of a load, force [N] and direction, such as -z")
+    if "mass" in table and not arm.gravity.any():
+        table.refuse("has a column mass, but the arm has no gravity; give force [N] and direction")
+
+    def wrench(row: Row) -> tuple[float, ...]:
+        """Return the load at the tip in a row (6,)."""
+        force = np.zeros(6)
+        if table.text(row, "force") and (newtons := table.number(row, "force")):
+            direction = table.text(row, "direction")
+            if direction not in AXES:
+                fault = f"{direction!r} is no axis; give one of {', '.join(AXES)}"
+                table.refuse(f"line {row[0]}, column direction: {fault}")
+            force[:3] += newtons * np.asarray(AXES[direction])
+        if table.text(row, "mass"):
+            force[:3] += table.number(row, "mass") * arm.gravity
+        return tuple(force.tolist())
+
     positions = []
     for row in table.rows:
         filled = [name for name in (*axes, *cables) if table.text(row, name)]
@@ -179,5 +210,6 @@ def read_tip_positions(
             table.refuse(f"line {row[0]}: no coordinate was measured")
         fields: dict[str, Any] = {axis: read[axis] for axis in axes if axis in read}
         fields[motors] = {name: value for name, value in read.items() if name in names}
+        fields["wrench"] = wrench(row)
         positions.append(TipPosition(**fields, std=std, label=table.text(row, "label")))
     return tuple(positions)

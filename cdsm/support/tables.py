@@ -15,6 +15,12 @@ from cdsm.support.files import read_text
 ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 """Units of angles in a header, in SI."""
 
+MEANINGFUL: Final = frozenset(
+    {"force", "moment", "mass", "load", "direction", "displacement", "test", "target"}
+    | {"tension", "pull", "minimum", "maximum"}
+)
+"""Names of columns that change an answer: a file whose reader does not know one is refused."""
+
 
 def csv_text(head: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
     """Write a header and rows as CSV."""
@@ -96,13 +102,18 @@ class Columns:
 
     Commas, semicolons or tabs separate them; commas are decimal marks if they do not. ``units`` has
     the units of each known column with their factors to SI; of a text, none. Other columns are
-    ignored, unless they are almost called as a known one or hold angles of unknown joints.
+    ignored, unless they are almost called as a known one, hold angles of unknown joints, or have a
+    name of :data:`MEANINGFUL` or of ``refused``, which this reader does not read.
     Spreadsheets also write empty columns at the end, and empty rows: they do not count.
     ``holds`` says what the rows are. FileError names each fault, with its line and column.
     """
 
     def __init__(
-        self, path: str | os.PathLike[str], units: Mapping[str, Mapping[str, float]], holds: str
+        self,
+        path: str | os.PathLike[str],
+        units: Mapping[str, Mapping[str, float]],
+        holds: str,
+        refused: Iterable[str] = (),
     ) -> None:
         table = read_table(path, ",;\t", rank=_cells_of_header)
         self.path = path
@@ -121,6 +132,11 @@ class Columns:
         for at, (name, unit) in enumerate(map(name_and_unit, table.header)):
             if name in self:
                 self.refuse(f"has two columns called {name}; give each once")
+            if name not in units and name in {*MEANINGFUL, *refused}:
+                known = f"a file of {holds} has {listed([*units], 12)}"
+                self.refuse(
+                    f"has a column {name}, which is not read: {known}. Rename it to keep it"
+                )
             as_long = [column for column in units if abs(len(column) - len(name)) < 2]
             hint = did_you_mean(name, as_long, least=0.8)
             if name in units:

@@ -98,6 +98,21 @@ def test_positions_come_out_in_si(tmp_path: Path) -> None:
     assert pulled == TipPosition(x=0.09, tension={"cable3_3": 2.0}, std=1e-3)
 
 
+def test_loads_of_positions_count(tmp_path: Path) -> None:
+    """The height of a loaded rod gives its EI; without the column force it would not."""
+    parameters = cdsm.ArmParameters(ROD, ("bending_stiffness",))
+    soft = parameters(bending_stiffness=9e-3)
+    rest = cdsm.forward_statics(soft, pull={"cable3_1": 0.0}, wrench=[0, 0, -0.2, 0, 0, 0])
+    z = 1e3 * rest.pose.tip[2, 3]
+    text = f"cable3_1 [mm],z [mm],direction,force [N]\n0,{z:.5f},-z,0.2\n0,0,,\n"
+    read = tips(tmp_path, text)
+    assert [tip.wrench[2] for tip in read] == [-0.2, 0.0]
+    fit = cdsm.identify(parameters, read[:1], {"bending_stiffness": (8e-3, 1.2e-2)})
+    assert fit.values[0] == pytest.approx(9e-3, rel=1e-3)
+    (hung,) = tips(tmp_path, "cable3_1 [mm],x [mm],mass [g]\n0,90,20\n")
+    assert hung.wrench[2] == pytest.approx(-0.02 * 9.81)
+
+
 @pytest.mark.parametrize("separator", [";", "\t"])
 def test_columns_are_separated_as_spreadsheets_do(separator: str, tmp_path: Path) -> None:
     text = f"{HEAD}a,90.5,5,3,\nb,,6,0,2\n"
@@ -117,6 +132,10 @@ def test_columns_are_separated_as_spreadsheets_do(separator: str, tmp_path: Path
         ("x,cable3_1 [mm]\n90,3\n", "column x has no unit"),
         ("x [mm],cable3_1 [mm],cable3_2 [N]\n90,3,2\n", r"call it cable3_2 \[mm\]"),
         (HEAD, "holds no positions"),
+        ("x [mm],cable3_1 [mm],force [N]\n9,3,2\n", "needs both columns of a load"),
+        ("x [mm],cable3_1 [mm],force [N],direction\n9,3,2,down\n", "'down' is no axis"),
+        ("x [mm],cable3_1 [mm],moment [N m]\n9,3,2\n", "column moment, which is not read"),
+        ("x [mm],cable3_1 [mm],minimum [N]\n9,3,2\n", "column minimum, which is not read"),
     ],
 )
 def test_faults_of_positions_name_line_and_column(text: str, said: str, tmp_path: Path) -> None:
