@@ -80,6 +80,7 @@ from cdsm.stiffness_matrix import stiffness as stiffness
 from cdsm.sweeps.files import read_sweep as read_sweep
 from cdsm.sweeps.poses import GridPoses as GridPoses
 from cdsm.sweeps.poses import PathPoses as PathPoses
+from cdsm.sweeps.poses import PlanePoses as PlanePoses
 from cdsm.sweeps.poses import RandomPoses as RandomPoses
 from cdsm.sweeps.sweep import sweep as sweep
 from cdsm.tension import Tension as Tension

@@ -58,7 +58,7 @@ class Status(IntEnum):
     PENDING = 9, "not computed yet"
     """Only in stores of sweeps: not computed yet, no quantity exists."""
     OUT_OF_REACH = 10, "the tip cannot reach its target"
-    """The tip cannot reach a target position."""
+    """The tip cannot reach a target position: no quantity exists."""
     UNREACHABLE_STIFFNESS = 11, "no admissible tensions give the stiffness"
     """No admissible tensions give the wanted stiffness (UnreachableStiffness)."""
     CHANGE_LIMITED = 12, "no tensions within the largest change give the stiffness"
@@ -113,7 +113,7 @@ class Status(IntEnum):
         return self in (Status.INVALID_INPUT, Status.FAILED)
 
 
-ENTRY_STATUSES: Final = tuple(status for status in Status if status <= Status.PENDING)
+ENTRY_STATUSES: Final = tuple(status for status in Status if status <= Status.OUT_OF_REACH)
 """Members that entries of batches and sweeps can have."""
 
 _UNMET: Final = (

@@ -115,6 +115,8 @@ _MINIMA = "Lower bounds of all tensions [N], a case each; with --angles, points 
 _COLOUR = "Colour of the workspace in --figure, default softest; with --angles, the curve: along."
 _GRID = "Grid of joint angles [deg, or mm where they slide]: first, last and number, or one angle; "
 _GRID += "other joints stay at 0."
+_PLANE = "Tips that fill a plane, for a map of the workspace: axis, place and distance of tips "
+_PLANE += "[mm]; without one, a twentieth of the arm's length."
 _ALONG = "Direction of along and payload, such as -y; default: x, y and z."
 _WORST = "Keep all segments within the bounds, whatever loads came before."
 _DIAMETER = "Of all cables, for clearances; default: that of a wire of the catalogue."
@@ -128,6 +130,7 @@ def sweep_postures(
     angles: options.AnglesOption = None,
     grid: Annotated[str | None, opt(_GRID, "JOINT=LOW:HIGH:N,...")] = None,
     path: Annotated[Path | None, opt(options.OF_SWEEP, "PATH.csv")] = None,
+    plane: Annotated[str | None, opt(_PLANE, "AXIS=PLACE[:STEP]")] = None,
     random: Annotated[int | None, opt("Sobol points within the joint limits.", "N", min=1)] = None,
     minimum: Annotated[str, opt(_MINIMA, "N,...")] = "0",
     maximum: options.MaximumOption = math.inf,
@@ -174,7 +177,7 @@ def sweep_postures(
     names = [*DEFAULT] if outputs is None else [name.strip() for name in outputs.split(",")]
     if figure is not None:
         names = [*dict.fromkeys([*names, *(() if at_one else ("tip_position",)), shown])]
-    postures = _postures(robot, angles, grid, path, random)
+    postures = _postures(robot, angles, grid, path, plane, random)
     wrench = options.load_at_tip(robot, load)
     dataset = cdsm.sweep(
         robot,
@@ -208,7 +211,8 @@ def sweep_postures(
     status = status.reshape(-1, len(low))[:, low.index(least)]
     causes = None
     if len(status) <= _EXPLAINED:
-        q = joint_angles(robot, postures)
+        q = dataset["q"].values if plane is not None else joint_angles(robot, postures)
+        q = q.reshape(-1, robot.nv)
         worst = worst_friction
         causes = explain_infeasible(robot, q, status, least, maximum, wrench, worst_friction=worst)
     if causes is not None:
@@ -250,11 +254,15 @@ def _postures(
     angles: str | None,
     grid: str | None,
     path: Path | None,
+    plane: str | None,
     random: int | None,
 ) -> PoseSet | Array:
     """Build the set of postures from the one option that is given."""
-    if sum(option is not None for option in (angles, grid, path, random)) != 1:
-        raise misuse("--angles, --grid, --path, --random", "give one of them.")
+    if sum(option is not None for option in (angles, grid, path, plane, random)) != 1:
+        remedy = "give one of them; --plane x=200 is a map of the workspace."
+        raise misuse("--angles, --grid, --path, --plane, --random", remedy)
+    if plane is not None:
+        return _plane(plane)
     if angles is not None:
         return options.joint_coordinates(angles, arm)[None]
     if grid is not None:
@@ -283,6 +291,19 @@ def _angles_of_tips(arm: cdsm.Manipulator, tips: Array | None, path: Path) -> Ar
             raise cdsm.FileError(path, problem)
         angles.append(solution.angles)
     return np.array(angles)
+
+
+def _plane(text: str) -> cdsm.PlanePoses:
+    """Read --plane, such as ``x=200`` or ``x=200:5``, in mm."""
+    axis, _, places = text.partition("=")
+    try:
+        position, *step = (1e-3 * float(number) for number in places.split(":"))
+    except ValueError:
+        position, step = math.nan, []
+    if axis.strip() not in ("x", "y", "z") or not math.isfinite(position) or len(step) > 1:
+        problem = f"{text!r} given; an axis and its place in mm are needed, such as x=200, and the "
+        raise misuse("--plane", f"{problem}distance of tips after a colon, such as x=200:5.")
+    return cdsm.PlanePoses(axis.strip(), position, *step)
 
 
 def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:

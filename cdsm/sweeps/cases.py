@@ -77,8 +77,11 @@ class Cases:
         """Compute outputs and ``status`` at q (P, nv); a row is a posture, wrench and minimum.
 
         Quantities of the posture alone have a row for each posture. NaN stands for what does not
-        exist.
+        exist. A posture of which an angle is NaN is out of reach.
         """
+        reached = ~np.isnan(q.sum(axis=1))
+        if not reached.all():
+            return self._with_gaps(q, reached, threads)
         cases = self.count
         wrench = np.tile(np.repeat(self.wrench, len(self.minimum), axis=0), (len(q), 1))
         low, high, bounded = self._bounds(q)
@@ -123,6 +126,18 @@ class Cases:
                 forces = self._forces(pose, wrench[row], low[row], high[row]) if held[row] else {}
                 for name, force in forces.items():
                     rows[name][row] = force
+        return rows
+
+    def _with_gaps(
+        self, q: Array, reached: NDArray[np.bool_], threads: int | None
+    ) -> dict[str, NDArray[Any]]:
+        """Compute the rows of postures that are ``reached`` (P,); the others are out of reach."""
+        start = np.clip(0.0, self.arm.lower, self.arm.upper)
+        rows = self.rows(np.where(reached[:, None], q, start), threads)
+        entries = np.repeat(reached, self.count)
+        for name, values in rows.items():
+            missed = ~(reached if len(values) == len(reached) else entries)
+            values[missed] = Status.OUT_OF_REACH if name == "status" else np.nan
         return rows
 
     def _batch_outputs(self) -> list[str]:

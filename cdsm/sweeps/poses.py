@@ -1,4 +1,4 @@
-"""Pose sets: grids over named joints, paths along a polyline, Sobol points within the limits.
+"""Pose sets: grids of joints, paths along a polyline, tips in a plane, Sobol points.
 
 A pose set does not depend on an arm. In chunks, its joint angles are computed where they are
 needed, so a large set is never in memory.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, final
@@ -16,8 +17,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, need
+from cdsm.kinematics import inverse_kinematics
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import instance, number_array, one_of, scalar, whole_number
+from cdsm.support.validation import (
+    XYZ,
+    instance,
+    number_array,
+    one_of,
+    scalar,
+    whole_number,
+)
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
@@ -28,6 +37,17 @@ MAXIMUM_POSES = 2**30
 
 _IN_MEMORY = 2**25  # postures without a store; each takes some 200 bytes in each case
 _ALL = slice(None)
+_TIP_STEP = 1 / 20  # distance of tips in a plane, over the arm's length
+_MOST_TIPS = 40_000
+_FIRST_TIPS = 30  # number of places from which a plane is entered at most
+_FIRST_BEND = 0.02  # of all joints [rad or m], from which the first tip is sought
+_NEWTON_STEPS = 60  # for one tip
+_FIRST_STEPS = 20  # within which it must be reached
+_REACHED = 1e-9  # largest distance of a tip from its target, over the arm's length
+_SINGULAR = 1e-6  # smaller singular values of a Jacobian, over the largest, count as zero
+_SETTLED = 1e-5  # change of the angles that ends the search [rad or m]
+_BACK = 0.5  # part of the way back to the straight arm in one step; all of it may swing
+_LARGEST_STEP = 0.3  # of an angle in one step [rad or m]
 
 
 class _Postures(NamedTuple):
@@ -40,7 +60,7 @@ class _Postures(NamedTuple):
 
 
 class PoseSet(ABC):
-    """Set of postures to sweep over: a grid, a path or random postures."""
+    """Set of postures to sweep over: a grid, a path, tips in a plane or random postures."""
 
     def angles(self, arm: Manipulator, chunk: int | None = None) -> xarray.DataArray:
         """Return the joint angles of this set: its dimensions, then ``joint`` [rad].
@@ -197,6 +217,139 @@ class RandomPoses(PoseSet):
 
         description = f"{self.count} Sobol points within the joint limits, seed {self.seed}"
         return _Postures({"pose": self.count}, angles, description, {})
+
+
+@final
+@dataclass(frozen=True)
+class PlanePoses(PoseSet):
+    """Postures whose tips fill a plane: a grid of tips, for maps of the workspace.
+
+    The grid is as large as the tip can reach. Each posture is continued from that of a neighbour,
+    and goes back to the straight arm as far as its tip allows: steps towards min ‖θ − θ_0‖² with
+    tip(θ) = target, where θ_0 is 0, or the limit nearest to 0. A tip that no neighbour leads to has
+    NaN for its angles, and the status OUT_OF_REACH in a sweep. The dimensions are the other two
+    axes, such as ``tip_y`` and ``tip_z``.
+
+    Attributes:
+        axis: Axis normal to the plane: ``"x"``, ``"y"`` or ``"z"``.
+        position: Coordinate of the plane along this axis [m], base axes.
+        step: Distance of neighbouring tips [m]; None: a twentieth of the arm's length.
+
+    Raises:
+        InvalidInput: ``axis`` is no axis, or ``step`` is not above zero. For an arm: the plane is
+            out of reach, or has more than 40 000 tips.
+    """
+
+    axis: str
+    position: float
+    step: float | None = None
+
+    def __post_init__(self) -> None:
+        one_of("axis", self.axis, XYZ)
+        scalar("position", self.position)
+        if self.step is not None and not scalar("step", self.step) > 0.0:
+            raise InvalidInput("step", f"{self.step:g} m given; a distance above 0 is needed.")
+
+    def _of(self, arm: Manipulator) -> _Postures:
+        axis = XYZ.index(self.axis)
+        plane = [k for k in range(3) if k != axis]
+        step = arm.length * _TIP_STEP if self.step is None else self.step
+        half = int(arm.length / step)
+        if (2 * half + 1) ** 2 > _MOST_TIPS:
+            problem = f"{1e3 * step:g} mm makes {2 * half + 1} x {2 * half + 1} tips; "
+            raise InvalidInput("step", f"{problem}{_MOST_TIPS} are taken at most.")
+        places = step * np.arange(-half, half + 1)
+        targets = np.empty((len(places), len(places), 3))
+        targets[..., axis] = self.position
+        targets[..., plane[0]], targets[..., plane[1]] = np.meshgrid(places, places, indexing="ij")
+        angles = _reach_tips(arm, targets)
+        known = np.isfinite(angles).all(axis=-1)
+        if not known.any():
+            problem = f"the tip reaches no place of the grid at {self.axis} = "
+            remedy = "move the plane towards the arm, or take a smaller step."
+            raise InvalidInput("position", f"{problem}{1e3 * self.position:g} mm; {remedy}")
+        rows, columns = (np.unique(indices) for indices in np.nonzero(known))
+        part = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+        q = angles[part]
+        names = [f"tip_{XYZ[k]}" for k in plane]
+        about = {"long_name": f"{self.axis} of all tips", "units": "m"}
+        coordinates: dict[str, Any] = {"plane": ((), self.position, about)}
+        for name, cut in zip(names, part, strict=True):
+            about = {"long_name": f"{name[-1]} of the tip", "units": "m"}
+            coordinates[name] = ((name,), places[cut], about)
+        description = f"tips in the plane {self.axis} = {1e3 * self.position:g} mm"
+        sizes = dict(zip(names, q.shape[:2], strict=True))
+        return _Postures(sizes, lambda *parts: q[parts], description, coordinates)
+
+
+def _reach_tips(arm: Manipulator, targets: Array) -> Array:
+    """Return angles (n, m, nv) whose tips are at targets (n, m, 3) [m]; NaN where none is found.
+
+    From the first tip that is found, each one starts at the angles of its neighbour.
+    """
+    angles = np.full((*targets.shape[:2], arm.nv), np.nan)
+    straight = np.clip(0.0, arm.lower, arm.upper)
+    bent = np.clip(_FIRST_BEND, arm.lower, arm.upper)
+    away = np.linalg.norm(targets - arm.at(straight).tip[:3, 3], axis=-1)
+    order = np.argsort(away, axis=None)[:: max(1, away.size // _FIRST_TIPS)]
+    border = deque[tuple[int, int]]()
+    for flat in order.tolist():
+        cell = divmod(flat, targets.shape[1])
+        solution = inverse_kinematics(arm, targets[cell], bent)
+        if solution.reachable:
+            angles[cell] = solution.angles
+            border.append(cell)
+            break
+    while border:
+        row, column = border.popleft()
+        for cell in ((row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1)):
+            inside = 0 <= cell[0] < targets.shape[0] and 0 <= cell[1] < targets.shape[1]
+            if inside and math.isnan(angles[cell][0]):
+                q = _nearest_angles(arm, targets[cell], angles[row, column], straight)
+                if q is not None:
+                    angles[cell] = q
+                    border.append(cell)
+    return angles
+
+
+def _nearest_angles(arm: Manipulator, target: Array, start: Array, straight: Array) -> Array | None:
+    """Return the angles nearest to the straight arm whose tip is at ``target``, or None.
+
+    The tip is moved to its target by Newton's steps of least length from ``start``. Steps within
+    the null space of the Jacobian then lead to θ − θ_0 = Jᵀλ. Joints at limits stay there.
+    """
+    reached = None
+    q = start
+    for count in range(_NEWTON_STEPS):
+        tip, jacobian = arm.body.tip(q)
+        error = target - tip[:3, 3]
+        near = float(np.linalg.norm(error)) <= _REACHED * arm.length
+        if near:
+            reached = q
+        elif reached is None and count >= _FIRST_STEPS:
+            return None
+        free = np.full(arm.nv, True)
+        for _ in range(arm.nv):
+            change = _step(
+                jacobian[:3] * free, error, _BACK * (straight - q) * free, reached is not None
+            )
+            blocked = ((q <= arm.lower) & (change < 0.0)) | ((q >= arm.upper) & (change > 0.0))
+            if not (blocked & free).any():
+                break
+            free &= ~blocked
+        largest = float(abs(change).max(initial=0.0))
+        if near and largest <= _SETTLED:
+            break
+        part = min(1.0, _LARGEST_STEP / max(largest, _SETTLED))
+        q = np.clip(q + part * change, arm.lower, arm.upper)
+    return reached
+
+
+def _step(J: Array, error: Array, back: Array, reached: bool) -> Array:
+    """Return the least step (nv,) that removes ``error`` (3,), and if ``reached`` goes ``back``."""
+    inverse = np.linalg.pinv(J, rcond=_SINGULAR)
+    change = inverse @ error
+    return change + back - inverse @ (J @ back) if reached else change
 
 
 def joint_angles(arm: Manipulator, q: PoseSet | ArrayLike) -> Array:

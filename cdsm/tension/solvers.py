@@ -97,7 +97,7 @@ def nondimensional(
     arm = 2.0 ** math.frexp(size.max())[1]
     A = J.T / arm
     b = torque / arm
-    A[size.T < NO_ARM * length] = 0.0
+    A[NO_ARM * length > size.T] = 0.0
     force = 2.0 ** math.frexp(max(abs(b).max(), low.max()))[1]
     return TensionProblem(A, b / force, low / force, high / force, arm, force)
 

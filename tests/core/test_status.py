@@ -17,7 +17,7 @@ ZERO = np.zeros(3)
 
 def test_codes_that_stand_in_stores_keep_their_names() -> None:
     names = "OK BEYOND_LIMITS COINCIDENT_SITES INFEASIBLE SOLVER_FAILED OUTSIDE_ELASTICITY"
-    names += " SINGULAR IMMOBILE UNSTABLE PENDING"
+    names += " SINGULAR IMMOBILE UNSTABLE PENDING OUT_OF_REACH"
     assert [status.name for status in ENTRY_STATUSES] == names.split()
     assert [int(status) for status in Status] == list(range(len(Status)))
 
