@@ -154,7 +154,13 @@ def _printed(report: Report, about: str = "") -> Console:
     from rich.table import Table
 
     console = Console(
-        record=True, file=StringIO(), width=100, markup=False, emoji=False, highlight=False
+        record=True,
+        file=StringIO(),
+        force_jupyter=False,  # there it would show each line at once, beside the text returned
+        width=100,
+        markup=False,
+        emoji=False,
+        highlight=False,
     )
     console.print(f"Stiffness check: {report.stiffness.posture.arm.name}", style="bold")
     if about:

@@ -256,3 +256,14 @@ def test_json_and_page_hold_the_report() -> None:
     assert "about &lt;it&gt;" in page
     assert "&lt;b&gt;0" in page
     assert "http" not in page
+
+
+def test_in_a_notebook_it_is_printed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """rich shows each line at once where it takes the session for a notebook."""
+    report = cdsm.stiffness(locked.hinge().at([0.0]), [20.0, 20.0]).report()
+    text = str(report)
+    shown: list[object] = []
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
+    monkeypatch.setattr("rich.jupyter.display", lambda *lines: shown.extend(lines))
+    assert str(report) == text
+    assert shown == []
