@@ -12,7 +12,7 @@ from typing import Final, Literal, SupportsIndex, final, get_args, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.cable_path import PathElement, Pulley, Sheath, Site, checked_path
+from cdsm.cable_path import PathElement, Pulley, Sheath, Site, check_cable_path
 from cdsm.errors import CdsmError, InvalidInput, listed
 from cdsm.geometry import Geometry
 from cdsm.support.format import plural
@@ -84,7 +84,7 @@ class Cable:
             checked_law(self.elasticity)
             one_of("control", self.control, get_args(Control))
             check_numbers(self)
-            sites = checked_path(self.sites, self.lead)
+            sites = check_cable_path(self.sites, self.lead)
             if self.minimum > self.maximum:
                 bounds = f"tensions from {self.minimum:g} to {self.maximum:g} N"
                 raise CdsmError(f"{bounds}; give minimum <= maximum.")

@@ -207,7 +207,7 @@ PathElement = Site | Pulley | Sheath
 """An entry of the path of a cable in an arm."""
 
 
-def checked_path(elements: object, lead: float) -> tuple[PathElement, ...]:
+def check_cable_path(elements: object, lead: float) -> tuple[PathElement, ...]:
     """Return the path of a cable with this lead [m], or InvalidInput, which names the entry."""
     if not isinstance(elements, list | tuple) or not all(
         isinstance(element, PathElement | JointPulley) for element in elements

@@ -219,13 +219,13 @@ class Shifts:
         N = self._pieces.compliance[ends.piece]
         length = self._pieces.length[ends.piece] * ends.free
         # ℓ bᵀ N b: 1, but for a groove at the other end of the piece; 1 on the rim
-        own = np.where(ends.free, length * _form(across, N, across), 1.0)
+        stiff = np.where(ends.free, length * _form(across, N, across), 1.0)
         i = np.arange(T)
         M = np.zeros((2 * T, 2 * T))
-        M[i, i] = own[:T]
+        M[i, i] = stiff[:T]
         M[i, T + i] = -length[:T]
-        M[T + i, i] = own[T:]
-        M[T + i, T + i] = own[T:] * self.arc + length[T:]
+        M[T + i, i] = stiff[T:]
+        M[T + i, T + i] = stiff[T:] * self.arc + length[T:]
         # neighbours share a piece, and each sees the other's contact shift
         j = np.flatnonzero(ends.before >= 0)
         k = ends.before[j]

@@ -23,7 +23,7 @@ one straight line, and its slope against the plane is
 
     tan γ = (h₂ − h₁)/(l₁ + r Φ + l₂).
 
-**Pulleys in a row** (:func:`settle`) share free pieces. The contacts of the neighbours
+**Pulleys in a row** (:func:`settle_row`) share free pieces. The contacts of the neighbours
 are held while each pulley is solved in closed form, one after the other, until none moves. In the
 plane each sweep squares the error.
 
@@ -47,8 +47,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.support.values import Array
-
-Indices = NDArray[np.intp]
 
 TOUCHES = 0
 """Outcome: the contacts are found."""
@@ -83,7 +81,7 @@ class Pulleys(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """Contacts of n pulleys with their cable; :func:`settle` fills them in."""
+    """Contacts of n pulleys with their cable; :func:`settle_row` fills them in."""
 
     arrival: Any  # (n, 3) [m]
     departure: Any  # (n, 3) [m]
@@ -235,7 +233,7 @@ def _sweep(
     return farthest, outcome, culprit
 
 
-def settle(
+def settle_row(
     start: Any, end: Any, low: int, high: int, pulleys: Pulleys, at: Contacts
 ) -> tuple[int, int]:
     """Find the contacts ``at`` the pulleys ``low`` to ``high``, a row between two sites.
@@ -319,21 +317,23 @@ def settle(
 
 
 def _settle_postures(
-    first: Indices,
+    first: NDArray[np.intp],
     start: Array,
     end: Array,
     pulleys: Pulleys,
     at: Contacts,
-    outcome: Indices,
-    culprit: Indices,
+    outcome: NDArray[np.intp],
+    culprit: NDArray[np.intp],
 ) -> None:
     centre, axis, radius, groove, turns = pulleys
     arrival, departure, angle, slope, touches = at
     for w in range(len(outcome)):
-        own = Pulleys(centre[w], axis[w], radius, groove, turns)
+        posture = Pulleys(centre[w], axis[w], radius, groove, turns)
         contacts = Contacts(arrival[w], departure[w], angle[w], slope[w], touches[w])
         for r in range(len(first) - 1):
-            fault, pulley = settle(start[w, r], end[w, r], first[r], first[r + 1], own, contacts)
+            fault, pulley = settle_row(
+                start[w, r], end[w, r], first[r], first[r + 1], posture, contacts
+            )
             if fault != TOUCHES:
                 outcome[w] = fault
                 culprit[w] = pulley
@@ -346,7 +346,7 @@ def _compiled() -> Callable[..., None]:
     from numba import njit
     from numba.extending import register_jitable
 
-    for function in (tangent, wrap, _after, _sweep, settle):
+    for function in (tangent, wrap, _after, _sweep, settle_row):
         register_jitable(function)
     try:
         compiled: Callable[..., None] = njit(cache=True, nogil=True, error_model="numpy")(
@@ -358,9 +358,9 @@ def _compiled() -> Callable[..., None]:
 
 
 def settle_postures(
-    first: Indices, start: Array, end: Array, pulleys: Pulleys
-) -> tuple[Contacts, Indices, Indices]:
-    """Find the contacts at W postures, compiled: :func:`settle` for each of R rows of pulleys.
+    first: NDArray[np.intp], start: Array, end: Array, pulleys: Pulleys
+) -> tuple[Contacts, NDArray[np.intp], NDArray[np.intp]]:
+    """Find the contacts at W postures, compiled: :func:`settle_row` for each of R rows of pulleys.
 
     Row r is made of the pulleys ``first[r]`` to ``first[r + 1]`` of P, between the sites
     ``start[:, r]`` and ``end[:, r]`` (W, R, 3) [m]. ``pulleys.centre`` and ``pulleys.axis`` are

@@ -20,7 +20,7 @@ from cdsm.support.result import Result, unit
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, ReadOnlyState, draw, frozen
 from cdsm.wrap_table import WrapTable, wrap_table
-from cdsm.wraps import Wrapping
+from cdsm.wrapping import Wrapping
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -30,7 +30,8 @@ from cdsm.errors import InvalidInput
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import Indices, cross, dot
 from cdsm.support.values import Array, frozen
-from cdsm.wraps import Wrapping, Wraps
+from cdsm.wrapping import Wrapping
+from cdsm.wraps import Wraps
 
 STRAIGHT = 1e-9
 """Wrap angle [rad] below which a cable counts as straight in a hole: the angle is rounding."""

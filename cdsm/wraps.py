@@ -24,18 +24,24 @@ from numpy.typing import NDArray
 
 from cdsm.cable import Cable, Cables
 from cdsm.cable_path import JointPulley, Pulley, Sheath, positions
-from cdsm.contact_shifts import Ends, Shifts
-from cdsm.contacts import BESIDE, INSIDE, SURFACE, TOUCHES, UNSETTLED, Contacts, Pulleys, settle
+from cdsm.contact_shifts import Ends
+from cdsm.contacts import (
+    BESIDE,
+    INSIDE,
+    SURFACE,
+    TOUCHES,
+    UNSETTLED,
+    Contacts,
+    Pulleys,
+    settle_row,
+)
 from cdsm.errors import InvalidInput, listed
 from cdsm.rigid_body import RigidBody
-from cdsm.routing import SHORTEST_SEGMENT, Indices, Node, Routing, Spans, located
+from cdsm.routing import SHORTEST_SEGMENT, Indices, Node, Routing, located
 from cdsm.status import Status
 from cdsm.support.values import Array, frozen
+from cdsm.wrapping import Wrapping
 
-Flags = NDArray[np.bool_]
-
-_ARC_STEP = math.radians(10.0)  # angle between points that draw an arc
-_NEAR = math.radians(0.1)  # wrap angle at which a remark says that the cable may lift off
 _PATTERNS = 64  # routings that an arm keeps, of the patterns that it met last
 
 _FAULTS = {
@@ -56,7 +62,7 @@ class Pattern(NamedTuple):
     source: list[int]  # of each node among the E entries of all paths, P arrivals, P departures
 
 
-class Row(NamedTuple):
+class PulleyRow(NamedTuple):
     """Pulleys that follow each other between two sites."""
 
     start: int  # entries of the sites among those of all paths
@@ -76,7 +82,7 @@ class Wraps:
         radius: r of each pulley (P,) [m].
         groove: Whether each pulley has a groove (P,).
         entry: Each pulley among the E entries of all paths that have a place on a link (P,).
-        row: Row of the joint that moves each entry (E,); the base is 0.
+        row: PulleyRow of the joint that moves each entry (E,); the base is 0.
         point: Position of each entry in the frame of this joint (E, 3) [m].
         local_axis: Axis of each pulley in this frame (P, 3).
         rows: Pulleys that follow each other between two sites.
@@ -87,12 +93,12 @@ class Wraps:
     cables: tuple[Cable, ...]
     pulleys: tuple[Pulley, ...]
     radius: Array
-    groove: Flags
+    groove: NDArray[np.bool_]
     entry: Indices
     row: Indices
     point: Array
     local_axis: Array
-    rows: tuple[Row, ...]
+    rows: tuple[PulleyRow, ...]
     every: bool
 
     @classmethod
@@ -108,7 +114,7 @@ class Wraps:
         axes: list[Array] = []
         pulleys: list[Pulley] = []
         entries: list[int] = []
-        runs: list[Row] = []
+        runs: list[PulleyRow] = []
         for cable in cables:
             start = 0
             first = len(pulleys)
@@ -122,7 +128,7 @@ class Wraps:
                     entries.append(len(rows))
                 else:
                     if len(pulleys) > first:
-                        runs.append(Row(start, len(rows), first, len(pulleys)))
+                        runs.append(PulleyRow(start, len(rows), first, len(pulleys)))
                     start = len(rows)
                     first = len(pulleys)
                 rows.append(row)
@@ -211,7 +217,7 @@ class Wraps:
             [True] * P,
         )
         for start, end, low, high in self.rows:
-            outcome, pulley = settle(points[start], points[end], low, high, pulleys, contacts)
+            outcome, pulley = settle_row(points[start], points[end], low, high, pulleys, contacts)
             if outcome != TOUCHES:
                 raise self.fault(outcome, pulley)
         return contacts
@@ -232,7 +238,7 @@ class Wraps:
         return entries
 
     def fault(self, outcome: int, pulley: int) -> InvalidInput:
-        """Return the error of an outcome of :func:`cdsm.contacts.settle` at one of the pulleys."""
+        """Return the error of an outcome of :func:`~cdsm.contacts.settle_row` at a pulley."""
         cable, label = self.label(pulley)
         message = (
             f"{label}: {_FAULTS[outcome]} at this posture. Move the pulley or its neighbours, "
@@ -345,7 +351,7 @@ class Wraps:
         height = float(axis @ apart)
         return float(np.linalg.norm(apart - height * axis)), height
 
-    def _check(self, row: Row) -> None:
+    def _check(self, row: PulleyRow) -> None:
         """Refuse what is wrong with a row of pulleys at any posture."""
         pulleys = range(row.low, row.high)
         for site, pulley in ((row.start, row.low), (row.end, row.high - 1)):
@@ -371,136 +377,6 @@ class Wraps:
                     message = f"{label} overlaps the one before it: their axes are "
                     message += f"{1e3 * apart:.6g} mm apart. Move one, or take smaller radii."
                     raise InvalidInput(f"cable {cable!r}", message)
-
-
-@dataclass(frozen=True, eq=False)
-class Wrapping:
-    """Cables over P pulleys at a posture; the routing is that of T pulleys that touch.
-
-    Attributes:
-        wraps: The paths of the cables.
-        pattern: Which pulleys touch, and the routing.
-        contacts: Where they touch, and the wrap angles.
-        node: Sites and contacts (3, N) [m].
-        spans: Segments between them.
-        lengths: L (C,) [m].
-        jacobian: J_L = ∂L/∂θ (C, nv) [m/rad].
-        arcs: Length of the cable on each pulley (P,) [m], if it touches.
-        centre: Centres (3, P) [m].
-        axis: Axes (3, P).
-    """
-
-    wraps: Wraps
-    pattern: Pattern
-    contacts: Contacts
-    node: Array
-    spans: Spans
-    lengths: Array
-    jacobian: Array
-    arcs: list[float]
-    centre: Array
-    axis: Array
-
-    @property
-    def touches(self) -> Flags:
-        """Whether the cable touches each pulley (P,)."""
-        return np.array(self.contacts.touches)
-
-    @property
-    def angle(self) -> Array:
-        """Wrap angle Φ (P,) [rad]; of a pulley that does not touch, negative."""
-        return np.array(self.contacts.angle)
-
-    @property
-    def slope(self) -> Array:
-        """Slope tan γ of the helix on each pulley (P,); 0 in a groove."""
-        return np.array(self.contacts.slope)
-
-    @cached_property
-    def shifts(self) -> Shifts:
-        """What the contacts do on their links when the joints move."""
-        pattern = self.pattern
-        chosen = pattern.pulley
-        centre = self.centre[:, chosen]
-        return Shifts(
-            routing=pattern.routing,
-            spans=self.spans,
-            ends=pattern.ends,
-            radial=self.node[:, pattern.contact] - np.concatenate([centre, centre], axis=1),
-            axis=self.axis[:, chosen],
-            radius=self.wraps.radius[chosen],
-            groove=self.wraps.groove[chosen],
-            arc=np.array(self.arcs)[chosen],
-            angle=self.angle[chosen],
-            slope=self.slope[chosen],
-        )
-
-    @cached_property
-    def remarks(self) -> tuple[str, ...]:
-        """What is doubtful: cables about to lift off, or beside a groove that they snap out of."""
-        touches = self.contacts.touches
-        remarks = []
-        for i, angle in enumerate(self.contacts.angle):
-            cable, label = self.wraps.label(i)
-            if angle > 0.0 and not touches[i]:
-                remarks.append(
-                    f"{cable} has snapped out of the groove of {label}, beside its plane: there L "
-                    "has a step, and an equilibrium may not exist"
-                )
-            elif abs(angle) < _NEAR:
-                remarks.append(
-                    f"{cable} is within {math.degrees(_NEAR):g}° of lifting off {label}: K_θ has "
-                    "another value on the other side"
-                )
-        return tuple(remarks)
-
-    @cached_property
-    def paths(self) -> tuple[Array, ...]:
-        """Points (n, 3) [m] along each cable: sites, and those on arcs, at most 10° apart."""
-        wraps = self.wraps
-        touches = self.contacts.touches
-        points = self.centre.T
-        paths: list[Array] = []
-        node = 0
-        pulley = 0
-        for cable in wraps.cables:
-            path: list[Array] = []
-            for element in positions(cable.sites):
-                if not isinstance(element, Pulley):
-                    path.append(self.node[:, node])
-                    node += 1
-                else:
-                    if touches[pulley]:
-                        path += self._arc(pulley, self.node[:, node] - points[pulley])
-                        node += 2
-                    pulley += 1
-            paths.append(frozen(np.array(path)))
-        return tuple(paths)
-
-    @cached_property
-    def rims(self) -> Array:
-        """Points (P, 37, 3) [m] on the circle of each pulley, at the radius of the cable."""
-        turn = np.linspace(0.0, 2.0 * np.pi, 37)
-        across = np.eye(3)[abs(self.axis).argmin(axis=0)]  # no pulley has its axis along it
-        first = np.cross(self.axis.T, across)
-        first *= (self.wraps.radius / np.linalg.norm(first, axis=1))[:, None]
-        second = np.cross(self.axis.T, first)
-        circle = np.cos(turn)[:, None] * first[:, None] + np.sin(turn)[:, None] * second[:, None]
-        return frozen(self.centre.T[:, None] + circle)
-
-    def _arc(self, pulley: int, begin: Array) -> list[Array]:
-        """Return points on the arc of a pulley that begins at ``begin``, seen from the centre."""
-        axis = self.axis[:, pulley]
-        angle = self.contacts.angle[pulley]
-        radial = begin - (axis @ begin) * axis
-        across = np.cross(axis, radial)
-        climb = self.contacts.slope[pulley] * self.wraps.radius[pulley] * axis
-        turns = np.linspace(0.0, angle, max(math.ceil(angle / _ARC_STEP), 1) + 1)
-        start = self.centre[:, pulley] + (axis @ begin) * axis
-        return [
-            start + math.cos(turn) * radial + math.sin(turn) * across + turn * climb
-            for turn in turns.tolist()
-        ]
 
 
 def placed(body: RigidBody, cables: Cables) -> Cables:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from cdsm.batch.quantities import Codes
 from cdsm.batch.rows import BodyArrays, Rows, tables_of
-from cdsm.contacts import TOUCHES, Contacts, Pulleys, settle, settle_postures
+from cdsm.contacts import TOUCHES, Contacts, Pulleys, settle_postures, settle_row
 from cdsm.routing import Indices
 from cdsm.status import Status
 from cdsm.support.values import Array
@@ -111,10 +111,10 @@ def _settle(wraps: Wraps, centre: Array, axis: Array, entry: Array) -> tuple[Con
     constants = [field.tolist() for field in pulleys[2:]]
     for w in range(N):
         points = entry[w].tolist()
-        own = Pulleys(centre[w].tolist(), axis[w].tolist(), *constants)
+        posture = Pulleys(centre[w].tolist(), axis[w].tolist(), *constants)
         at = Contacts(np.zeros((P, 3)).tolist(), np.zeros((P, 3)).tolist(), *_blank(P))
         for start, end, low, high in wraps.rows:
-            outcome_of_row, _ = settle(points[start], points[end], low, high, own, at)
+            outcome_of_row, _ = settle_row(points[start], points[end], low, high, posture, at)
             outcomes[w] = max(outcomes[w], outcome_of_row)
         for part, field in zip(parts, at, strict=True):
             part.append(field)
@@ -140,13 +140,13 @@ def _part(
     assert wraps is not None
     pattern = wraps.pattern(touches)
     routing = pattern.routing
-    found = Contacts(*(field[chosen] for field in contacts))
-    points = np.concatenate([entry[chosen], found.arrival, found.departure], axis=1)
+    contacts_here = Contacts(*(field[chosen] for field in contacts))
+    points = np.concatenate([entry[chosen], contacts_here.arrival, contacts_here.departure], axis=1)
     node = points[:, pattern.source]
     # in the frames of the links
     apart = node - frames.origin[chosen][:, routing.row]
     site = np.einsum("npyx,npy->npx", frames.rotation[chosen][:, routing.row], apart)
-    arcs = wraps.radius * found.angle * np.sqrt(1.0 + found.slope**2)
+    arcs = wraps.radius * contacts_here.angle * np.sqrt(1.0 + contacts_here.slope**2)
     fixed = np.repeat(routing.fixed[None], len(chosen), axis=0)
     np.add.at(fixed.T, pattern.cable, arcs[:, pattern.pulley].T)
     dimensions = tables_of(rows.arm).dimensions._replace(site=site, fixed=fixed)
@@ -167,7 +167,7 @@ def _part(
         status=status[chosen],
         touches=touches,
     )
-    if (shifted := _shifted(wraps, pattern, node, found, frames, chosen)).any():
+    if (shifted := _shifted(wraps, pattern, node, contacts_here, frames, chosen)).any():
         return replace(part, shifts=_shifts(part, shifted))
     return part
 

@@ -7,7 +7,15 @@ import pytest
 
 import cdsm
 from cdsm import Pulley, Site
-from cdsm.contacts import BESIDE, TOUCHES, UNSETTLED, Contacts, Pulleys, settle, settle_postures
+from cdsm.contacts import (
+    BESIDE,
+    TOUCHES,
+    UNSETTLED,
+    Contacts,
+    Pulleys,
+    settle_postures,
+    settle_row,
+)
 from tests.support.pulleys import Link, arm_of
 
 LINKS = [
@@ -88,7 +96,7 @@ def test_compiled_and_plain_contacts_agree_in_every_pattern() -> None:
             np.zeros((n, 3)).tolist(), np.zeros((n, 3)).tolist(), [0.0] * n, [0.0] * n, [True] * n
         )
         lists = Pulleys(*(field.tolist() for field in pulleys))
-        outcome, culprit = settle(start.tolist(), end.tolist(), 0, n, lists, plain)
+        outcome, culprit = settle_row(start.tolist(), end.tolist(), 0, n, lists, plain)
         rows = pulleys._replace(centre=pulleys.centre[None], axis=pulleys.axis[None])
         found, outcomes, culprits = settle_postures(
             np.array([0, n]), start[None, None], end[None, None], rows
