@@ -119,6 +119,9 @@ class Scene:
         self._label.visible = pose is not None and shown.status is not Status.OK
         shaped = frozenset() if self._shapes is None else self._shapes.rows
         bones, brackets = ([], []) if pose is None else pose.stick_figure(shaped)
+        if pose is not None and pose.wrapping is not None:  # pulleys that cables touch
+            rims = pose.wrapping.rims[pose.wrapping.touches]
+            brackets = [*brackets, *np.stack([rims[:, :-1], rims[:, 1:]], axis=2).reshape(-1, 2, 3)]
         before = shown.reference.bones if shown.reference and shown.rest else ()
         for node, lines in (
             (self._sticks, bones),

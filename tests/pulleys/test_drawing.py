@@ -1,11 +1,15 @@
 """What is drawn of cables over pulleys: arcs on circles, dashed where no cable touches."""
 
+import importlib.util
+
 import numpy as np
+import pytest
 
 import cdsm
 from cdsm import Pulley, Site
+from cdsm.view import serve
 from tests.support.pictures import artists
-from tests.support.pulleys import Link, arm_of
+from tests.support.pulleys import Link, arm_of, finger
 
 HINGE = [Link("phalanx", "base", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))]
 R = 0.006
@@ -50,3 +54,18 @@ def test_clearances_count_the_arcs() -> None:
     both = arm.with_cables([*arm.cables, other])
     near = cdsm.clearance(both.at([1.0]), diameter=1e-4)
     assert near.cables < 0.02
+
+
+@pytest.mark.skipif(importlib.util.find_spec("viser") is None, reason="needs the extra [view]")
+def test_the_view_has_arcs_and_the_rims_that_cables_touch() -> None:
+    arm = finger().with_springs({f"to_l{k}": 0.5 for k in range(4)})
+    for flexion in (0.1, 1.2):
+        q = [0.0, flexion, flexion, flexion]
+        pose = arm.at(q)
+        with serve(arm, port=0, q=q, minimum=0.0) as view:
+            for i, path in enumerate(pose.cable_paths):
+                ends = np.stack([path[:-1], path[1:]], axis=1)
+                drawn = view._server.scene.get_handle_by_name(f"/cables/{i}")
+                np.testing.assert_allclose(drawn.points, ends, atol=1e-7)
+            thin = view._server.scene.get_handle_by_name("/brackets").points
+            assert len(thin) == len(pose.brackets) + 36 * pose.wraps.touches.sum()
