@@ -81,6 +81,17 @@ class ArmParameters:
         """
         return {name: float(np.median(self.values(name))) for name in self.names}
 
+    def start(self, name: str, low: float, high: float) -> float | None:
+        """Return a value in SI from which to seek a parameter within bounds; None: any.
+
+        It is that of the arm, or else the typical one: of a friction of 0, no derivative shows what
+        it does.
+        """
+        for value in (self.present[name], parameter_of(name).typical):
+            if value is not None and low < value < high:
+                return value
+        return None
+
     def values(self, name: str) -> list[float]:
         """Return the values in SI that the parameter ``name`` has in the joints or cables."""
         parameter = parameter_of(name)

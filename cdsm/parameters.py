@@ -72,6 +72,9 @@ class Parameter(Source):
         shares: Parameter that has the same number, which this one adds to or multiplies; or None.
         is_spring: Whether springs that were given to the arm itself replace it.
         lacks: What an arm lacks that has no such number, and what to do.
+        usual: Smallest and largest usual value in SI; None: half the value of the arm to twice it.
+        typical: Value in SI from which it is sought where the arm's own is at a bound, or None.
+        acts_under_load: Whether forces on an arm with locked motors show it.
     """
 
     kinds: tuple[Kind, ...]
@@ -80,6 +83,9 @@ class Parameter(Source):
     shares: str | None = None
     is_spring: bool = False
     lacks: str = "no part with this number there"
+    usual: tuple[float, float] | None = None
+    typical: float | None = None
+    acts_under_load: bool = True
 
 
 def attribute(kind: Kind, name: str, unit: Unit, **more: Any) -> Parameter:
@@ -180,8 +186,10 @@ PARAMETERS: Final[dict[str, Parameter]] = {
         set=Cable.with_friction,
         is_common=True,
         largest=0.5,
+        usual=(0.0, 1.0),
+        typical=0.1,
     ),
-    "slack": attribute("cables", "slack", METRE),
-    "gain": attribute("cables", "gain", NUMBER, largest=0.5),
+    "slack": attribute("cables", "slack", METRE, acts_under_load=False),
+    "gain": attribute("cables", "gain", NUMBER, largest=0.5, acts_under_load=False),
 }
 """All parameters by name; :class:`~cdsm.ArmParameters` explains them."""

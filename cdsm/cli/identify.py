@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import math
+import shlex
+from collections.abc import Collection, Iterable, Iterator
 from itertools import zip_longest
 from pathlib import Path
 from textwrap import wrap
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -16,6 +18,9 @@ import cdsm
 from cdsm.cli import options
 from cdsm.cli.options import FigureOption, JsonOption, file_opt, opt
 from cdsm.cli.output import answer, misuse, write, write_picture
+
+if TYPE_CHECKING:
+    from cdsm.identification import Identification
 
 _TEST = "Tensile test, a line per reading. Columns: displacement (or extension, stroke, strain, …) "
 _TEST += "[mm] and force (or load) [N], in the order recorded; as examples/data/TEST.csv."
@@ -83,6 +88,10 @@ _FREE = "Parameter to find; repeat it: friction; rigidity (factor on EA); spring
 _FREE += "lead, hole_radius, disk_offset, link_length [mm]; link_mass [g]; joint_stiffness, "
 _FREE += "bending_stiffness [N m/rad, N m²]. Default bounds: half to "
 _FREE += "twice the arm's own value; friction 0 to 1."
+_START = (
+    "Value from which to seek a parameter, in its unit; repeat it. Default: that of the arm; of a "
+)
+_START += "friction of 0, 0.1."
 
 
 def identify_parameters(
@@ -90,6 +99,7 @@ def identify_parameters(
     loops: Annotated[Path, typer.Argument(metavar="LOOPS.csv", help=_LOOPS)],
     free: Annotated[list[str], opt(_FREE, "NAME[@JOINT][=LOW:HIGH]")],
     displacement_std: Annotated[float, opt("Standard deviation of a reading.", "MM")],
+    start: Annotated[list[str] | None, opt(_START, "NAME[@JOINT]=VALUE")] = None,
     changes: options.SetOption = None,
     minimum: Annotated[float | None, opt("Least tension, if not in LOOPS.csv.", "N")] = None,
     tests: Annotated[
@@ -103,13 +113,13 @@ def identify_parameters(
     A test applies a force along a direction and removes it, with locked motors. The answer gives
     each parameter with a 95 % interval, and warns of parameters that the tests do not determine.
     """
-    from cdsm.arm_parameters import ArmParameters
+    from cdsm.arm_parameters import ArmParameters, parameter_of
     from cdsm.identification.experiment_plan import plan_tests
 
     described = options.load_arm(arm, changes)
     ranges = _ranges(free)
     for name in ranges:
-        if name.partition("@")[0] in ("slack", "gain"):
+        if not parameter_of(name).acts_under_load:
             problem = (
                 "changes no weight test: positions of the tip show it (in Python, TipPosition)."
             )
@@ -117,7 +127,8 @@ def identify_parameters(
     parameters = ArmParameters(described, tuple(ranges))
     units = {name: parameters.unit(name) for name in ranges}
     labels = {f"{name} [{unit}]" if unit else name: name for name, (unit, _) in units.items()}
-    start = {label: parameters.present[name] / units[name][1] for label, name in labels.items()}
+    starts = _starts(start or [], ranges)
+    present = {name: parameters.present[name] / units[name][1] for name in ranges}
 
     def model_of(**values: float) -> cdsm.Manipulator:
         return parameters(**{labels[at]: x * units[labels[at]][1] for at, x in values.items()})
@@ -126,20 +137,84 @@ def identify_parameters(
         loops, described, displacement_std=1e-3 * displacement_std, minimum=minimum
     )
     if tests is not None:
-        planned = plan_tests(model_of, start, read, tests=tests)
+        expected = {label: (present | starts)[name] for label, name in labels.items()}
+        planned = plan_tests(model_of, expected, read, tests=tests)
         write_picture(figure, planned.plot)
         return answer(as_json, planned.to_dict(), planned)
     if any(loop.displacements is None for loop in read):
         raise cdsm.FileError(loops, "has no readings: no column displacement [mm], or x, y, z.")
-    bounds = {at: ranges[name] or _usual(name, start[at]) for at, name in labels.items()}
-    for at, (low, high) in bounds.items():
-        if not low < start[at] < high:  # of a friction of 0, no derivative shows what it does
-            start[at] = (low + high) / 2.0
-    identification = cdsm.identify(model_of, read, bounds, start=start)
-    write_picture(figure, identification.plot)
-    return answer(
-        as_json, identification.to_dict(), identification, warnings=identification.warnings
+    bounds = {name: ranges[name] or _usual(name, present[name]) for name in ranges}
+    for name, (low, high) in bounds.items():
+        size = units[name][1]
+        typical = parameters.start(name, size * low, size * high)
+        if typical is not None:
+            starts.setdefault(name, typical / size)
+    identification = cdsm.identify(
+        model_of,
+        read,
+        {label: bounds[name] for label, name in labels.items()},
+        start={label: starts[name] for label, name in labels.items() if name in starts},
     )
+    write_picture(figure, identification.plot)
+    command = ["cdsm", "identify", str(arm), str(loops)]
+    for change in changes or ():
+        command += ["--set", change]
+    command += [] if minimum is None else ["--minimum", f"{minimum:g}"]
+    warnings = [
+        *identification.warnings,
+        *_next_commands(identification, command, [*ranges], bounds, displacement_std),
+    ]
+    return answer(as_json, identification.to_dict(), identification, warnings=warnings)
+
+
+def _next_commands(
+    identification: Identification,
+    command: list[str],
+    names: list[str],
+    bounds: dict[str, Limits],
+    displacement_std: float,
+) -> Iterator[str]:
+    """Yield the commands that answer the doubts of an identification, each as a sentence.
+
+    ``names`` are those of the parameters, ``bounds`` theirs, ``command`` is without both.
+    """
+    import numpy as np
+
+    def with_options(
+        bounds: dict[str, Limits], std: float = displacement_std, values: Iterable[float] = ()
+    ) -> str:
+        entries = [*command]
+        for name, (low, high) in bounds.items():
+            entries += ["--free", f"{name}={low:.6g}:{high:.6g}"]
+        for name, value in zip(names, values, strict=False):
+            entries += ["--start", f"{name}={value:.6g}"]
+        return shlex.join([*entries, "--displacement-std", f"{std:.4g}"])
+
+    wider = dict(bounds)
+    for label, side in identification.at_bounds.items():
+        name = names[identification.names.index(label)]
+        low, high = bounds[name]
+        if side == "upper":
+            wider[name] = low, high + (high - low)
+        elif low > 0.0:  # below 0 no size, stiffness or friction lies
+            wider[name] = low / 2.0, high
+    if wider != bounds:
+        yield f"Next, with wider bounds: {with_options(wider)}"
+    elif identification.unfinished:
+        values = identification.values.tolist()
+        yield f"Next, from there: {with_options(bounds, values=values)}"
+    undetermined = np.flatnonzero(np.isinf(identification.std)).tolist()
+    doubtful = [*undetermined, *(j for _, j in identification.correlated())]
+    if doubtful and len(names) > 1:
+        fixed = names[doubtful[0]]
+        left = {name: limits for name, limits in bounds.items() if name != fixed}
+        yield f"Next, with {fixed} as it is in the arm: {with_options(left)}"
+    if not identification.is_explained:
+        std = displacement_std * math.sqrt(identification.reduced_chi_square)
+        yield (
+            f"Next, if {displacement_std:g} mm was a guess and the model is right: "
+            f"{with_options(bounds, std)}"
+        )
 
 
 def _ranges(free: list[str]) -> dict[str, Limits | None]:
@@ -159,10 +234,28 @@ def _ranges(free: list[str]) -> dict[str, Limits | None]:
     return ranges
 
 
+def _starts(start: list[str], names: Collection[str]) -> dict[str, float]:
+    """Return the value of each parameter of --start, by name and in its unit."""
+    values: dict[str, float] = {}
+    for entry in start:
+        name, _, value = entry.partition("=")
+        if name not in names:
+            raise misuse("--start", f"{name} is not free; --free has {', '.join(names)}.")
+        if name in values:
+            raise misuse("--start", f"{name} is given twice.")
+        form = "NAME=VALUE, such as friction=0.1"
+        (values[name],) = options.parse_numbers("--start", value, (1,), form)
+    return values
+
+
 def _usual(name: str, value: float) -> Limits:
-    """Return the default bounds of a parameter of this value: friction 0 to 1, else ½ to twice."""
-    if name.partition("@")[0] == "friction":
-        return 0.0, 1.0
+    """Return the default bounds of a parameter of this value: its usual ones, else ½ to twice."""
+    from cdsm.arm_parameters import parameter_of
+
+    parameter = parameter_of(name)
+    if parameter.usual is not None:
+        size = parameter.unit.shown[1]
+        return parameter.usual[0] / size, parameter.usual[1] / size
     if not 0.0 < value < math.inf:
         raise misuse("--free", f"the arm has {name} {value:g}; give bounds, {name}=LOW:HIGH.")
     return value / 2.0, 2.0 * value

@@ -196,7 +196,7 @@ def plan_tests(
     most = whole_number("tests", tests, 1)
     if not values.all():
         remedy = "0 given; intervals are judged relative to the expected value. Give a small one "
-        remedy += "(commands: in ARM.toml or by --set)."
+        remedy += "(commands: --start)."
         raise InvalidInput(f"parameters[{names[int(abs(values).argmin())]!r}]", remedy)
     bounds = {n: (min(0.0, 2.0 * v), max(0.0, 2.0 * v)) for n, v in zip(names, values, strict=True)}
     usable = list[WeightLoop]()

@@ -9,7 +9,7 @@ from typing import final
 import numpy as np
 
 from cdsm.errors import InvalidInput, listed
-from cdsm.identification.identify import check_measurements, identify
+from cdsm.identification.identify import check_measurements, fit_parameters
 from cdsm.identification.least_squares import LeastSquares, Test
 from cdsm.identification.measurement import Measurement
 from cdsm.identification.result import Identification, independent_readings, likely
@@ -187,7 +187,10 @@ def compare_explanations(
     as_it_is = _as_it_is(model_of, measurements)
     with progress_allowed(progress):
         parameters = show_progress(free, "fitting each parameter")
-        fits = {name: identify(model_of, measurements, {name: free[name]}) for name in parameters}
+        fits = {
+            name: fit_parameters(model_of, measurements, {name: free[name]}, other_starts=False)
+            for name in parameters
+        }
         names = sorted(free, key=lambda name: fits[name].chi_square)
         best = fits[names[0]]
         together = {
@@ -218,7 +221,7 @@ def _both(
     for start in (float(middle), other.parameters[b]):
         begin = best.parameters | {b: start}
         try:
-            fits.append(identify(model_of, measurements, bounds, start=begin))
+            fits.append(fit_parameters(model_of, measurements, bounds, begin, other_starts=False))
         except InvalidInput:
             if start != middle:
                 raise

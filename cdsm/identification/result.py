@@ -19,12 +19,13 @@ from cdsm.identification.measurement import WeightLoop, measurement_name
 from cdsm.manipulator import Manipulator
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import aligned
-from cdsm.support.progress import progress_allowed, show_progress
+from cdsm.support.progress import progress_allowed
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import scalar
 from cdsm.support.values import Array, Plotted, frozen
 
 _CORRELATED = 0.95  # a warning names two parameters whose correlation exceeds this value
+_RIDGED = 0.9  # the print names two parameters whose correlation exceeds this value
 _UNLIKELY = 1e-3  # least probability of χ²; below it, the model does not explain the measurements
 _OWN = "own unit"
 _MIXED = "N/m or m"
@@ -140,37 +141,67 @@ class Identification(Result, Plotted):
     def warnings(self) -> tuple[str, ...]:
         """One sentence for each reason not to trust the result; empty if there is none."""
         sentences = list[str]()
-        r = self.correlation
-        std = self.std
         for combination in self._determination.open_combinations:
             sentences.append(
                 f"not identifiable (rank {self.rank} of {len(self.names)}): no prediction changes "
                 f"with {combination}, so their values are one choice of many. Fix one, or measure "
                 "what separates them."
             )
-        for j, i in zip(*np.triu_indices(len(self.names), 1), strict=True):
-            if abs(r[i, j]) > _CORRELATED and math.isfinite(std[i]):
-                sentences.append(
-                    f"{self.names[j]} and {self.names[i]} are correlated at {r[i, j]:+.4f}: mostly "
-                    "a combination of them is determined. Measure at other postures, directions or "
-                    "tensions."
-                )
-        for name, value, limits in zip(self.names, self.values, self.bounds, strict=True):
-            for side, limit in zip(("lower", "upper"), limits, strict=True):
-                if value == limit:
-                    sentences.append(
-                        f"{name} is at its {side} bound, {limit:g}: the optimum lies there or "
-                        "beyond. Widen the bounds, or doubt the model."
-                    )
-        if not likely(self.chi_square, self.freedom):
+        for i, j in self.correlated():
+            remedy = "Measure at other postures, directions or tensions."
+            sentences.append(f"{self.ridge(i, j)} {remedy}")
+        for name, side in self.at_bounds.items():
+            limit = self.bounds[self.names.index(name), ("lower", "upper").index(side)]
+            sentences.append(
+                f"{name} is at its {side} bound, {limit:g}: the optimum lies there or beyond. "
+                "Widen the bounds, or doubt the model."
+            )
+        if not self.is_explained:
             k = int(abs(self.residuals).argmax())
             sentences.append(
                 f"the model does not explain the measurements within their σ: {self.verdict}, "
                 f"worst at {self.reading_names[k]} with {self.residuals[k]:+.3g} σ. Standard "
-                "deviations and intervals are valid for a right model only; from other values of "
-                "the arm the search may find a better optimum."
+                "deviations and intervals are valid for a right model only. Searches from other "
+                "starts found nothing better: free another parameter, or doubt σ."
             )
         return (*sentences, *([self.unfinished] if self.unfinished else []))
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether at least one in a thousand right models would leave this χ² or more."""
+        return likely(self.chi_square, self.freedom)
+
+    @property
+    def at_bounds(self) -> dict[str, str]:
+        """Parameters that are at a bound, by name: at the lower or the upper one."""
+        rows = zip(self.names, self.values, self.bounds, strict=True)
+        return {
+            name: ("lower", "upper")[limits.tolist().index(value)]
+            for name, value, limits in rows
+            if value in limits
+        }
+
+    def correlated(self, size: float = _CORRELATED) -> list[tuple[int, int]]:
+        """Return the pairs of determined parameters whose correlation exceeds ``size``."""
+        r = self.correlation
+        finite = np.isfinite(self.std)
+        pairs = zip(*np.triu_indices(len(self.names), 1), strict=True)
+        return [(int(i), int(j)) for i, j in pairs if abs(r[i, j]) > size and finite[[i, j]].all()]
+
+    def ridge(self, i: int, j: int) -> str:
+        """Describe along which values of two parameters χ² hardly rises, in a sentence.
+
+        Where p_i is off by its σ_i, the best p_j is off by r σ_j, and χ² is larger by 1.
+        """
+        r = self.correlation[i, j]
+        a, b = (self.names[k] for k in (i, j))
+        low, high = self.values[i] + self.std[i] * np.array([-1.0, 1.0])
+        start, end = self.values[j] + r * self.std[j] * np.array([-1.0, 1.0])
+        return (
+            f"{a} and {b} are correlated at {r:+.4f}: mostly a combination of them is determined. "
+            f"On the ridge from {a} {low:.4g}, {b} {start:.4g} to {a} {high:.4g}, {b} {end:.4g}, "
+            "χ² rises by at most 1."
+        )
 
     def confidence(
         self, level: float = 0.95, *, progress: bool = True
@@ -201,8 +232,9 @@ class Identification(Result, Plotted):
         best = problem.point(self.values)
         jacobian = self.jacobian * problem.slope(best)
         intervals = dict[str, tuple[float, float]]()
-        with progress_allowed(progress):
-            for i in show_progress(range(best.size), "finding the confidence of the parameters"):
+        counted = problem.counted("finding the confidence of the parameters: predictions")
+        with progress_allowed(progress), counted:
+            for i in range(best.size):
                 known = math.isfinite(self.std[i])
                 limits = interval(problem, best, jacobian, i, rise) if known else None
                 intervals[self.names[i]] = limits or (-math.inf, math.inf)
@@ -226,7 +258,9 @@ class Identification(Result, Plotted):
         note = "(95 % from the std of the linear model; in Python, confidence() profiles χ²)"
         model = f"({frictionless_model(self.arm)}; secant where a force is given; "
         model += "loops with friction; tips at rest)"
-        shown = [*aligned(lines), note, "", *aligned(tests), model, "", self.verdict]
+        warned = self.correlated()
+        ridges = [self.ridge(i, j) for i, j in self.correlated(_RIDGED) if (i, j) not in warned]
+        shown = [*aligned(lines), note, *ridges, "", *aligned(tests), model, "", self.verdict]
         return "\n".join([*shown, *self.warnings])
 
     @property

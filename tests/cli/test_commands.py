@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -384,6 +385,22 @@ def test_identify(tmp_path: Path) -> None:
         assert value == pytest.approx(true[name], rel=0.05)
     bounded = told(*asked, "--free", "rigidity=0.5:0.9", code=3)["warnings"]
     assert any(sentence.startswith("rigidity is at its upper bound, 0.9") for sentence in bounded)
+    # the command of the warning finds what these bounds exclude
+    (advice,) = (s for s in bounded if s.startswith("Next, with wider bounds: "))
+    _, command, *rest = shlex.split(advice.partition(": ")[2])
+    wider = told(command, *rest)
+    assert wider["values_own_unit"] == pytest.approx(found["values_own_unit"], rel=1e-3)
+    # from a friction of 0 in the file, and from another start, it is the same
+    again = told(
+        *asked, "--free", "rigidity=0.5:2", "--set", "friction=0", "--start", "rigidity=0.7"
+    )
+    assert again["values_own_unit"] == pytest.approx(found["values_own_unit"], rel=1e-3)
+    for start, problem in (
+        ("rigidity=1", "rigidity is not free"),
+        ("friction", "give NAME=VALUE"),
+        ("friction=2", "outside the bounds 0 to 1"),
+    ):
+        assert problem in " ".join(call(*asked, "--start", start).stderr.split())
     assert sum(told(*asked, "--tests", 1)["counts"]) == 1
     assert "give bounds, spring=LOW:HIGH" in call(*asked, "--free", "spring").stderr
     assert "slack changes no weight test" in call(*asked, "--free", "slack=0:1").stderr

@@ -1,6 +1,7 @@
 """Identification finds the arm that the measurements came from, and says what they cannot tell."""
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -163,7 +164,30 @@ def test_measurements_that_the_model_does_not_explain_are_named() -> None:
     assert any("does not explain" in each and "posture 5" in each for each in found.warnings)
 
 
-ONE, SOFT = {"hole_radius": (0.02, 0.05)}, {"drive": (1.0, 50.0)}
+def test_the_ridge_of_two_parameters_is_where_chi_square_rises_by_one() -> None:
+    fit = NOISY
+    problem = fit.problem
+    ridged = fit.correlated(0.9)
+    assert ridged
+    for i, j in ridged:
+        assert abs(fit.correlation[i, j]) > 0.9
+        sentence = fit.ridge(i, j)
+        assert sentence in str(fit)
+        ends = re.findall(rf"{fit.names[i]} (\S+), {fit.names[j]} (\S+?),? ", sentence)
+        for end, side in zip(ends, (-1.0, 1.0), strict=True):
+            fixed, beside = (float(number) for number in end)
+            assert fixed == pytest.approx(fit.values[i] + side * fit.std[i], rel=1e-3)
+            # of the linear model: the change of residuals is J Δp, and the other parameters follow
+            others = [k for k in range(len(fit.names)) if k != i]
+            J = fit.jacobian * fit.std
+            follow = np.linalg.lstsq(J[:, others], -side * J[:, i], rcond=None)
+            best = fit.values[j] + follow[0][others.index(j)] * fit.std[j]
+            assert beside == pytest.approx(best, rel=1e-3)
+            assert follow[1] == pytest.approx(1.0, rel=1e-3)
+    assert problem.cost(problem.point(fit.values)) == pytest.approx(fit.chi_square)
+
+
+ONE, SOFT = {"hole_radius": (0.02, 0.05)}, {"drive": (2e3, 4e3)}
 
 
 def searched(free: Any = ONE, model_of: Any = prototype, **changes: Any) -> Identification:
