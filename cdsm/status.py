@@ -91,6 +91,8 @@ class Status(IntEnum):
     """A tension is above the maximum of its cable."""
     SLACK = 26, "a cable is at 0 N, and can only add tension"
     """A cable is at 0 N, and can only add tension."""
+    SELF_CONTACT = 27, "links of the arm overlap"
+    """Links of the arm overlap, which are no neighbours: the arm passes through itself."""
 
     @property
     def word(self) -> str:

@@ -52,9 +52,9 @@ def _faults(report: Report) -> Iterator[str]:
         yield ". ".join([describe_buckling(K), *map(str, report.remedies)])
     elif report.condition > 1e12:  # singular but for rounding
         yield f"the arm is about to buckle: K_θ has the condition number {report.condition:.2g}."
-    for status, sentence in K.verdict.findings:
-        if status in (Status.UNSTABLE_TO_ONE_SIDE, Status.ABOVE_MAXIMUM):
-            yield f"{sentence}."
+    for finding in K.verdict.findings:
+        if finding.status in (Status.UNSTABLE_TO_ONE_SIDE, Status.ABOVE_MAXIMUM):
+            yield f"{finding.sentence}."
     violation = report.bound_violation or 0.0
     kkt = report.kkt_residual or 0.0
     if max(violation, kkt) > TOLERANCE:

@@ -19,14 +19,18 @@ from cdsm.statics.solve import NEUTRAL, Balance, Point, settle
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.verdict import (
+    MOST_JOINTS,
     Finding,
     Verdict,
+    find_doubts,
     find_excess,
     find_imbalance,
+    find_slack,
+    find_stops,
     imbalance_of,
     judge,
 )
-from cdsm.support.format import aligned, coordinates, merged, plural, prepare_json, without_rounding
+from cdsm.support.format import aligned, coordinates, merged, prepare_json, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import Direction, instance, unit_direction, wrench_vector
 from cdsm.support.values import Array, draw, frozen
@@ -43,7 +47,6 @@ FRICTIONLESS = (
 )
 """What a result says of an arm with friction that it leaves out."""
 
-_LISTED = 6  # most joints at stops that a print lists; more are counted
 _LOCKED = 1e6  # a direction is locked if it is so many times stiffer than the softest axis
 _NEUTRAL = 1e-2  # smallest eigenvalue over the magnitudes of its terms: they cancel, to 1 %
 
@@ -170,8 +173,8 @@ class Equilibrium(Result):
     def warnings(self) -> tuple[str, ...]:
         """Sentences on what qualifies this equilibrium; empty if it is simply stable.
 
-        They say that the arm jumped on the way here, is neutral, rests on a stop, is not in
-        balance, or that a cable is above its maximum or slack.
+        They say that the arm jumped on the way here, is neutral, rests on a stop, passes through
+        itself, is not in balance, or that a cable is above its maximum or slack.
         """
         return self.verdict.warnings
 
@@ -180,24 +183,22 @@ class Equilibrium(Result):
         arm = self.pose.arm
         if self.branch < 1.0:
             share = f"at {100.0 * self.branch:.4g} % of load and pull its branch of equilibria ends"
-            yield Status.MOVED, f"JUMPED: {share}; from there the arm moves to this other one"
+            sentence = f"JUMPED: {share}; from there the arm moves to this other one"
+            yield Finding(Status.MOVED, sentence, "JUMPED")
         elif self.jumped:
-            yield Status.MOVED, "SNAPPED: on the way here the arm snapped through"
+            sentence = "SNAPPED: on the way here the arm snapped through"
+            yield Finding(Status.MOVED, sentence, "SNAPPED")
         if not self.stable:
-            yield Status.NEUTRAL, "NEUTRAL: not every joint is brought back"
+            yield Finding(Status.NEUTRAL, "NEUTRAL: not every joint is brought back")
         elif self.neutral:
-            yield Status.NEUTRAL, "NEUTRAL: a motion of the joints meets hardly any resistance"
-        if len(self.at_limit) > _LISTED:
-            count = f"{len(self.at_limit)} of {plural(arm.nv, 'joint')}"
-            yield Status.AT_STOP, f"{count} rest on their stops"
-        elif self.at_limit:
-            rest = "rests on its stop" if len(self.at_limit) == 1 else "rest on their stops"
-            yield Status.AT_STOP, f"{listed(self.at_limit)} {rest}"
+            sentence = "NEUTRAL: a motion of the joints meets hardly any resistance"
+            yield Finding(Status.NEUTRAL, sentence)
+        yield from find_stops(self.at_limit, arm.nv)
+        yield from find_doubts(self.pose)
         imbalance = imbalance_of(self.pose, self.tension, self.wrench, self.residual)
         yield from find_imbalance(arm, imbalance, self.residual)
         yield from find_excess(arm, self.tension)
-        if self.slack:
-            yield Status.SLACK, f"slack: {listed(self.slack)}"
+        yield from find_slack(self.slack)
 
     @quantity("1")
     def slack(self) -> tuple[str, ...]:
@@ -340,9 +341,7 @@ class Equilibrium(Result):
         lines = [*aligned(rows), f"tip moved by {moved} mm", *events_text(self.events)]
         lines += [self.history] if self.history else []
         stopped = np.flatnonzero(self.stop_torque).tolist()
-        if len(stopped) > _LISTED:
-            lines.append(f"{len(stopped)} of {plural(arm.nv, 'joint')} rest on their stops")
-        else:
+        if len(stopped) <= MOST_JOINTS:
             lines += [
                 f"{arm.joint_names[i]} rests on its stop, which pushes with "
                 f"{self.stop_torque[i]:.4g} {arm.torque_unit(i)}"

@@ -91,7 +91,7 @@ def notes(K: Stiffness) -> tuple[str, ...]:
             missing = [f"{fixed}; cartesian: in the plane of other axes"]
     stiffness = f"smallest joint stiffness {least_joint_stiffness(K)}"
     least = f"{K.verdict.word}, {stiffness} ({model_of(K)})"
-    return (*missing, *K.posture.remarks, least)
+    return (*missing, least)
 
 
 def model_of(K: Stiffness) -> str:

@@ -430,8 +430,9 @@ class Stiffness(Result):
         """Sentences on what makes the numbers doubtful; empty for a stable arm in balance.
 
         They say that the arm is UNSTABLE, or so without cables at 0 N; that its tensions do not
-        balance it; that a cable is above its maximum, or about to leave a pulley; or that cables at
-        0 N count as taut. ``report().remedies`` are changes that would hold an unstable arm.
+        balance it; that it passes through itself; that a cable is above its maximum, or about to
+        leave a pulley; or that cables at 0 N count as taut. ``report().remedies`` are changes that
+        would hold an unstable arm.
         """
         return self.verdict.warnings
 

@@ -6,7 +6,8 @@ arm of which another says something else.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple, final
 
@@ -15,6 +16,7 @@ import numpy as np
 from cdsm.errors import listed
 from cdsm.posture import Posture
 from cdsm.status import Status
+from cdsm.support.format import plural
 from cdsm.support.values import Array
 from cdsm.terms import ConstantPull, torque_size, without_cables
 
@@ -35,13 +37,24 @@ _SEVERITY: Final = (
     Status.AT_STOP,
     Status.UNBALANCED,
     Status.ABOVE_MAXIMUM,
+    Status.SELF_CONTACT,
     Status.SLACK,
     Status.OK,
 )
-_HELD: Final = (Status.OK, Status.SLACK)
+_HELD: Final = (Status.OK, Status.SELF_CONTACT, Status.SLACK)
+_LOOSE: Final = (Status.UNSTABLE, Status.UNSTABLE_TO_ONE_SIDE, Status.NEUTRAL)
+MOST_JOINTS: Final = 6
+"""Most joints at stops that a text lists; more are counted."""
 
-Finding = tuple[Status, str]
-"""Cause why an arm is not simply stable, and the sentence that says so; OK for a mere note."""
+_NAMED = 2  # most cables or joints in a label
+
+
+class Finding(NamedTuple):
+    """Cause why an arm is not simply stable, and the words that say so; OK for a mere note."""
+
+    status: Status
+    sentence: str
+    label: str = ""  # a few words for a heading; empty: the title of the status
 
 
 @final
@@ -64,28 +77,38 @@ class Verdict:
     @property
     def warnings(self) -> tuple[str, ...]:
         """The sentences of all findings."""
-        return tuple(sentence for _, sentence in self.findings)
+        return tuple(finding.sentence for finding in self.findings)
 
     @property
     def heading(self) -> str:
-        """The verdict in capitals: ``STABLE``, or ``NOT IN BALANCE``."""
-        return "STABLE" if self.status is Status.OK else self.status.title
+        """All findings in a few words: ``STABLE``, or ``BUCKLED at 12.3 N; joint1 on its stop``."""
+        found = [finding for finding in self.findings if finding.status is not Status.OK]
+        labels = [finding.label or finding.status.title for finding in found]
+        return "; ".join(["STABLE", *labels] if self.is_held else labels)
 
     @property
     def word(self) -> str:
         """The verdict as prints have it, such as ``stable``."""
-        if self.status is Status.SLACK:
-            return "stable even without the cables at 0 N"
-        return "stable" if self.status is Status.OK else self.heading
+        if not self.is_held:
+            return self.status.title
+        slack = any(finding.status is Status.SLACK for finding in self.findings)
+        return "stable even without the cables at 0 N" if slack else "stable"
 
     @property
     def is_held(self) -> bool:
         """Whether the arm is stable and in balance where it is; cables may be slack."""
         return self.status in _HELD
 
+    @property
+    def is_firm(self) -> bool:
+        """Whether every motion of the joints off their stops is resisted where the arm is."""
+        return not any(finding.status in _LOOSE for finding in self.findings)
+
     def with_findings(self, findings: Iterable[Finding]) -> Verdict:
-        """Return the verdict that knows more, such as that the arm buckled on the way."""
-        return judge([*findings, *self.findings])
+        """Return the verdict that knows more; a new finding stands for all of the same cause."""
+        news = tuple(findings)
+        causes = {finding.status for finding in news}
+        return judge([*news, *(old for old in self.findings if old.status not in causes)])
 
 
 class Imbalance(NamedTuple):
@@ -98,17 +121,16 @@ class Imbalance(NamedTuple):
 
 def judge(findings: Iterable[Finding]) -> Verdict:
     """Return the verdict on an arm, given all causes why it is not simply stable."""
-    return Verdict(tuple(sorted(findings, key=lambda finding: _SEVERITY.index(finding[0]))))
+    return Verdict(tuple(sorted(findings, key=lambda finding: _SEVERITY.index(finding.status))))
 
 
 def judge_stiffness(K: Stiffness) -> Verdict:
     """Return the verdict on an arm of which K_θ, tensions and wrench are known."""
     imbalance = imbalance_of(K.posture, K.tension, K.wrench, K.residual)
-    wrapping = K.posture.wrapping
     return judge(
         [
             *_instability(K),
-            *((Status.OK, remark) for remark in (wrapping.remarks if wrapping else ())),
+            *find_doubts(K.posture),
             *find_imbalance(K.posture.arm, imbalance, K.residual),
             *find_excess(K.posture.arm, K.tension),
         ]
@@ -131,18 +153,50 @@ def find_imbalance(arm: Manipulator, imbalance: Imbalance, residual: Array) -> I
         joint = imbalance.joint
         missing = f"{abs(residual[joint]):.3g} {arm.torque_unit(joint)}"
         sentence = f"not in balance: {missing} missing at {arm.joint_names[joint]}"
-        yield Status.UNBALANCED, sentence
+        yield Finding(Status.UNBALANCED, sentence)
 
 
-def find_excess(arm: Manipulator, tension: Array) -> Iterator[Finding]:
-    """Yield which cables are above their own maximum, with their tensions."""
-    maximum = np.array([cable.maximum for cable in arm.cables])
-    above = np.flatnonzero(tension > (1.0 + _ROUNDING) * maximum).tolist()
-    names = [
-        f"{arm.cables[c].name} at {tension[c]:.4g} N (maximum {maximum[c]:g} N)" for c in above
-    ]
+def find_excess(arm: Manipulator, tension: Array, maximum: float = math.inf) -> Iterator[Finding]:
+    """Yield which cables are above their own maximum, or above ``maximum`` [N] of all cables."""
+    most = np.minimum([cable.maximum for cable in arm.cables], maximum)
+    above = np.flatnonzero(tension > (1.0 + _ROUNDING) * most).tolist()
+    names = [arm.cables[c].name for c in above]
+    sizes = [f"{arm.cables[c].name} at {tension[c]:.4g} N (maximum {most[c]:g} N)" for c in above]
     if names:
-        yield Status.ABOVE_MAXIMUM, f"above the maximum of the cable: {listed(names, 3)}"
+        sentence = f"above the maximum of the cable: {listed(sizes, 3)}"
+        label = f"{listed(names, _NAMED)} above the maximum"
+        yield Finding(Status.ABOVE_MAXIMUM, sentence, label)
+
+
+def find_stops(joints: Sequence[str], count: int) -> Iterator[Finding]:
+    """Yield which joints rest on their stops, of ``count`` that the arm has."""
+    if not joints:
+        return
+    label = f"rests on the stop of {listed(joints, _NAMED)}"
+    if len(joints) <= MOST_JOINTS:
+        verb = "rests on its stop" if len(joints) == 1 else "rest on their stops"
+        sentence = f"{listed(joints, MOST_JOINTS)} {verb}"
+    elif len(joints) < count:
+        sentence = f"{len(joints)} of {plural(count, 'joint')} rest on their stops"
+    else:
+        sentence = label = f"all {plural(count, 'joint')} are at their stops"
+    yield Finding(Status.AT_STOP, sentence, label)
+
+
+def find_slack(cables: Sequence[str]) -> Iterator[Finding]:
+    """Yield which cables are slack."""
+    if cables:
+        yield Finding(Status.SLACK, f"slack: {listed(cables)}", f"{listed(cables, _NAMED)} slack")
+
+
+def find_doubts(pose: Posture) -> Iterator[Finding]:
+    """Yield that the arm passes through itself, and that cables are about to leave a pulley."""
+    notes = pose.wrapping.remarks if pose.wrapping else ()
+    for remark in pose.remarks:
+        if remark in notes:
+            yield Finding(Status.OK, remark)
+        else:
+            yield Finding(Status.SELF_CONTACT, remark, "the arm passes through itself")
 
 
 def describe_buckling(K: Stiffness) -> str:
@@ -189,24 +243,27 @@ def least_eigenpair(K: Array, arm: Manipulator) -> tuple[float, Array]:
 def _instability(K: Stiffness) -> Iterator[Finding]:
     """Yield that the arm is unstable, or is so without the cables at 0 N, or that there are any."""
     if not K.is_stable:
-        yield Status.UNSTABLE, describe_buckling(K)
+        yield Finding(Status.UNSTABLE, describe_buckling(K))
         return
     if not K.slack:
         return
     cables = f"{listed(K.slack, 4)} at 0 N"
+    label = f"{listed(K.slack, _NAMED)} at 0 N"
     if K.friction != "frictionless":
-        yield Status.SLACK, f"{cables} count as taut to both sides in all numbers of this K"
+        sentence = f"{cables} count as taut to both sides in all numbers of this K"
+        yield Finding(Status.SLACK, sentence, label)
     elif K.margin_without_slack > 0.0:
-        yield (
+        yield Finding(
             Status.SLACK,
             f"{cables} only pull: along(u) holds for a force along +u, and prints show the softer "
             "of both sides; joint, compliance, cartesian, spatial, modes and is_stable count these "
             "cables as taut",
+            label,
         )
     else:
         value, motion = least_eigenpair(K.without_slack, K.posture.arm)
         joint = K.posture.arm.joint_names[int(abs(motion).argmax())]
-        yield (
+        yield Finding(
             Status.UNSTABLE_TO_ONE_SIDE,
             f"UNSTABLE TO ONE SIDE: without {cables}, which only pull, nothing holds the arm, "
             f"{joint} least; the smallest eigenvalue of K_θ without them is {value:.4g} "

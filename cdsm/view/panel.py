@@ -47,8 +47,14 @@ _COLORS: Final = {
     Status.OK: _GREEN,
     Status.UNSTABLE: _RED,
     Status.SINGULAR: _RED,
-    Status.MOVED: _AMBER,
+    Status.UNSTABLE_TO_ONE_SIDE: _RED,
+    Status.MOVED: _RED,
+    Status.NEUTRAL: _AMBER,
+    Status.AT_STOP: _AMBER,
+    Status.UNBALANCED: _AMBER,
+    Status.ABOVE_MAXIMUM: _AMBER,
 }
+_DOUBTFUL: Final = (Status.SELF_CONTACT, Status.SLACK)  # of an arm that is held
 _BOX: Final = '<div style="height:{};overflow-y:auto;font-size:0.8em">\n\n{}\n\n</div>'
 """Box of fixed height, so that sliders do not move while they are dragged."""
 
@@ -210,10 +216,8 @@ def _force_range(arm: Manipulator, start: Setting) -> float:
 def results_text(shown: Shown, scene: Scene, remark: str = "") -> str:
     """Write the results ``shown``: status, remarks, table of numbers, legend of the scene."""
     color = _COLORS.get(shown.status, _GREY)
-    if shown.status is Status.OK and shown.doubts:
+    if shown.verdict is not None and shown.verdict.status in _DOUBTFUL:
         color = _AMBER
-    if shown.buckled is not None:
-        color = _RED
     style = f"background:{color};color:white;text-align:center"
     parts = [f'<div style="{style}"><b>{escaped(shown.heading)}</b></div>']
     parts += [] if shown.status is Status.OK else [f"{shown.status.message}."]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final, final
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
-from cdsm.errors import CdsmError, listed
+from cdsm.errors import CdsmError
 from cdsm.friction.capstan import can_stick
 from cdsm.manipulator import Manipulator
 from cdsm.plots.style import tension_colors
@@ -22,7 +23,7 @@ from cdsm.statics.events import Event, events_under
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.format import plural
+from cdsm.stiffness_matrix.verdict import Finding, Verdict, find_excess
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, distribute_tension
 from cdsm.view.ellipsoid import Ellipsoid, ellipsoid
@@ -54,48 +55,19 @@ class Shown:
     """Results at a setting; a missing result is None, never that of a past setting."""
 
     setting: Setting
-    status: Status  # OK: the arm is stable
-    problem: str = ""  # error message, or why the arm is not stable, or that it crosses itself
+    status: Status  # OK: the arm is stable; else why not, or the cause of an error
+    problem: str = ""  # error message, or what qualifies the verdict
+    verdict: Verdict | None = None  # on the arm as it is shown
     reference: Posture | None = None  # posture of the setting
     tension: Tension | None = None  # tensions at the reference
     stiffness: Stiffness | None = None  # stiffness at the posture that is shown
     rest: Equilibrium | None = None  # under the force, if the arm sags
     sliding: NDArray[np.bool_] | None = None  # holes (P,) in which a cable slides, if it moved
-    buckled: Event | None = None  # loss of stability before the whole force acts, if the arm sags
 
     @property
     def heading(self) -> str:
-        """The status as the page has it, with all that makes a stable arm doubtful."""
-        if self.buckled is not None:
-            status = [f"BUCKLED at {self.buckled.load:.4g} N"]
-        elif self.status is Status.OK:
-            status = [] if self.doubts else ["STABLE"]
-        else:
-            status = [self.status.title]
-        return "; ".join([*status, *self.doubts])
-
-    @cached_property
-    def doubts(self) -> tuple[str, ...]:
-        """What holds an arm that is stable: a stop, slack cables, tensions above the maximum."""
-        pose = self.posture
-        if pose is None or self.tensions is None:
-            return ()
-        doubts = list[str]()
-        names = pose.arm.cables.names
-        if self.rest is not None and self.rest.at_limit:
-            doubts.append(f"rests on the stop of {listed(self.rest.at_limit, 2)}")
-        most = np.array([cable.maximum for cable in pose.arm.cables])
-        most = np.minimum(most, self.setting.maximum) * (1.0 + 1e-9)
-        above = [names[c] for c in np.flatnonzero(self.tensions > most)]
-        if above:
-            doubts.append(f"{listed(above, 2)} above the maximum")
-        if self.rest is not None and self.rest.slack:
-            doubts.append(f"{plural(len(self.rest.slack), 'cable')} slack")
-        if pose.self_contacts:
-            doubts.append("the arm touches itself")
-        if self.stiffness is not None and self.status is Status.OK:
-            doubts += self.stiffness.warnings
-        return tuple(doubts)
+        """The verdict as the page has it; the cause, where there are no results."""
+        return self.status.title if self.verdict is None else self.verdict.heading
 
     @property
     def posture(self) -> Posture | None:
@@ -112,8 +84,8 @@ class Shown:
     @property
     def source(self) -> Equilibrium | Stiffness | None:
         """What knows the compliance of the tip; None if the arm is not stable as shown."""
-        stable = self.status in (Status.OK, Status.MOVED)
-        return (self.rest or self.stiffness) if stable else None
+        firm = self.verdict is not None and self.verdict.is_firm
+        return (self.rest or self.stiffness) if firm else None
 
     @cached_property
     def ellipsoid(self) -> Ellipsoid | None:
@@ -164,40 +136,48 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
             rest = cdsm.forward_statics(arm, pull=setting.pull, wrench=force)
             slides = None if rest.sliding is None else rest.sliding != 0
             results |= {"rest": rest, "stiffness": rest.stiffness, "sliding": slides}
-            status = Status.MOVED if rest.jumped else Status.OK
-            status = Status.NEUTRAL if rest.neutral or not rest.stable else status
-            history = [rest.history] if rest.history else []
-            warnings = "\n".join([*rest.warnings, *history, *rest.pose.remarks])
-            return Shown(**results, status=status, problem=warnings)
+            excess = find_excess(arm, rest.tension, setting.maximum)
+            history = (rest.history,) if rest.history else ()
+            return _judged(results, rest.verdict.with_findings(excess), history)
         wrench = force * (not setting.sag)
         tension = distribute_tension(pose, setting.minimum, setting.maximum, wrench)
         results["tension"] = tension
         if not setting.sag:
             results["stiffness"] = K = stiffness(pose, tension)
             _ = K.compliance  # raises if K_θ is singular
-            if not K.is_stable:
-                remedies = map(str, find_remedies(K))  # takes tenths of a second
-                problem = "\n".join([*K.warnings, *remedies])
-                return Shown(**results, status=Status.UNSTABLE, problem=problem)
-            status = Status.OK if K.verdict.is_held else K.verdict.status
-            problem = "\n".join([*K.warnings, *pose.remarks])
-            return Shown(**results, status=status, problem=problem)
+            # remedies take tenths of a second
+            return _judged(results, K.verdict, () if K.is_stable else tuple(find_remedies(K)))
         locked = cdsm.stuck_stiffness if arm.has_friction else stiffness
         stable = locked(pose, tension).is_stable
         rest, results["sliding"] = _rest(pose, tension, force)
         results |= {"rest": rest, "stiffness": rest.stiffness}
         _ = rest.compliance
-        if stable and not arm.has_friction and force.any():
+        findings = list(find_excess(arm, rest.tension, setting.maximum))
+        if not stable:
+            sentence = "UNSTABLE: without the force, the arm moves away from this posture"
+            findings.append(Finding(Status.MOVED, sentence))
+        elif not arm.has_friction and force.any():
             locked_arm = LockedArm(pose, tension.values, np.zeros(6))
-            events = events_under(locked_arm, force, tension.maximum_held)
-            ends = [event for event in events if event.kind == "buckling"]
-            results["buckled"] = ends[0] if ends else None
-            stable = not ends
-        status = Status.OK if stable else Status.MOVED
-        status = status if rest.stable else Status.NEUTRAL
-        return Shown(**results, status=status, problem="\n".join(rest.pose.remarks))
+            findings += _buckling(events_under(locked_arm, force, tension.maximum_held))
+        return _judged(results, rest.verdict.with_findings(findings))
     except CdsmError as error:
         return Shown(**results, status=error.status, problem=str(error))
+
+
+def _judged(results: dict[str, Any], verdict: Verdict, notes: Sequence[object] = ()) -> Shown:
+    """Return results with the verdict on the arm, and notes such as what would make it stable."""
+    status = Status.OK if verdict.is_held else verdict.status
+    problem = "\n".join([*verdict.warnings, *map(str, notes)])
+    return Shown(**results, verdict=verdict, status=status, problem=problem)
+
+
+def _buckling(events: Sequence[Event]) -> Iterator[Finding]:
+    """Yield that the arm buckled, if it lost its stability before the whole force acts."""
+    for event in events:
+        if event.kind == "buckling":
+            label = f"BUCKLED at {event.load:.4g} N"
+            yield Finding(Status.MOVED, f"{label}, {event.place} most", label)
+            return
 
 
 def _rest(

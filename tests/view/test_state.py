@@ -13,6 +13,7 @@ from cdsm.support.values import Array
 from cdsm.view.panel import python_text, results_text, tensions_text
 from cdsm.view.scene import Scene
 from cdsm.view.state import Setting, Shown, show
+from tests.core.test_posture import ring
 from tests.support import foreign
 from tests.support.arms import readme_geometry
 
@@ -226,8 +227,30 @@ def test_an_arm_that_collapsed_onto_a_stop_is_never_stable() -> None:
         return show(arm, Setting(q=q, minimum=10.0, force=push, sag=True))
 
     beyond = banner(1.2 * held.force)
-    assert beyond.buckled is not None
-    assert beyond.buckled.load == pytest.approx(held.force, rel=1e-6)
-    assert beyond.heading.startswith(f"BUCKLED at {held.force:.4g} N")
+    assert beyond.verdict is not None
+    assert beyond.rest is not None
+    assert beyond.heading.startswith(f"BUCKLED at {held.force:.4g} N; rests on the stop of joint")
     assert "STABLE" not in beyond.heading
+    assert set(beyond.rest.warnings) < set(beyond.verdict.warnings)
+    assert beyond.problem == "\n".join(beyond.verdict.warnings)
+    assert (beyond.status, beyond.verdict.is_held) == (Status.MOVED, False)
     assert banner(0.05 * held.force).heading == "STABLE"
+    limited = show(arm, replace(banner(1.2 * held.force).setting, maximum=30.0))
+    assert "above the maximum" in limited.heading
+    assert "(maximum 30 N)" in limited.problem
+
+
+def test_banner_and_prints_have_one_verdict() -> None:
+    """The same words, from the same place."""
+    shown = pulled(0.004, -0.006, 0.0)
+    rest = shown.rest
+    assert rest is not None
+    assert shown.verdict is not None
+    assert shown.heading == rest.verdict.heading == "STABLE; cable6_2 slack"
+    assert shown.problem == "\n".join(rest.warnings)
+    closed = ring(50.0)
+    through = show(closed.arm, Setting(q=closed.q, minimum=50.0, force=np.zeros(3)))
+    assert through.stiffness is not None
+    assert through.stiffness.verdict.heading == through.heading
+    assert "the arm passes through itself" in through.heading
+    assert closed.remarks[0] in through.problem
