@@ -69,4 +69,6 @@ COMMANDS: dict[str, Callable[..., int]] = {
 }
 
 for name, command in COMMANDS.items():
-    app.command(name, help=inspect.getdoc(command))(reported(command))
+    text = inspect.getdoc(command) or ""
+    # without short_help, lists of the commands cut the first line after 45 characters
+    app.command(name, help=text, short_help=text.partition("\n")[0])(reported(command))

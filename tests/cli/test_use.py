@@ -171,3 +171,12 @@ def test_help_fits_a_terminal() -> None:
         page = CliRunner().invoke(app, [name, "--help"], terminal_width=80).output.splitlines()
         assert len(page) <= 80
         assert max(map(len, page)) <= 80
+
+
+def test_the_list_of_commands_has_their_whole_first_lines() -> None:
+    page = CliRunner().invoke(app, ["--help"], terminal_width=80).output
+    assert "..." not in page.partition("Commands:")[2]
+    for command in COMMANDS.values():  # the page of the site is made of these
+        line = command.get_short_help_str()
+        assert line == command.help.partition("\n")[0]
+        assert line in " ".join(page.split())

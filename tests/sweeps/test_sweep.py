@@ -76,7 +76,7 @@ def single(
 
 def test_every_entry_is_what_the_single_functions_say(everything: xr.Dataset) -> None:
     seen: set[Status] = set()
-    springy = short_arm(spring=1500.0).with_friction(0.1)
+    springy = short_arm(spring=8000.0, lead=0.3).with_friction(0.1)
     soft = cdsm.sweep(springy, GRID, minimum=[40.0, 100.0], outputs=EVERYTHING)
     flat = cdsm.sweep(short_arm(), np.zeros((1, 6)), minimum=20.0, outputs=EVERYTHING)
     for arm, dataset, maximum in (
