@@ -36,9 +36,10 @@ from cdsm.plots.paths import plot_path
 from cdsm.plots.plans import plot_path_plan as plot_path_plan
 from cdsm.plots.plans import plot_stiffness_ranges
 from cdsm.plots.plans import plot_tracking_run as plot_tracking_run
-from cdsm.plots.style import save_figure
+from cdsm.plots.style import STYLE, save_figure
 
 __all__ = [
+    "STYLE",
     "plot_arm",
     "plot_arms",
     "plot_map",

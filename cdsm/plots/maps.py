@@ -110,7 +110,7 @@ def plot_map(
     check_sweep(dataset)
     one_of("statistic", statistic, get_args(Statistic))
     value, poses, cases = _value(dataset, quantity)
-    name = "stiffness" if quantity == "along" else str(value.long_name).split(",")[0]
+    name = _words_of_along(dataset) if quantity == "along" else str(value.long_name).split(",")[0]
     unit, _ = display_of(si_of(value.units))
     label = f"{name} [{one_unit(unit) or '-'}]"
     if len(poses) == 1 and section is None and _is_line(dataset, poses[0]):
@@ -123,6 +123,12 @@ def plot_map(
         panels = list(_tip_cells(dataset, value, poses, cases, section, statistic))
         label += f"\n{statistic} of the postures in a cell"
     return _plot_cells(dataset, panels, label, axs, title)
+
+
+def _words_of_along(dataset: xarray.Dataset) -> str:
+    """Return the words of ``along``, with its direction if that is the only one left."""
+    alone = "direction" in dataset.coords and not dataset["direction"].ndim
+    return f"stiffness along {dataset['direction'].item()}" if alone else "stiffness"
 
 
 def _value(dataset: xarray.Dataset, quantity: str) -> tuple[xarray.DataArray, list[str], list[str]]:
@@ -411,7 +417,7 @@ def _sentence(dataset: xarray.Dataset) -> str:
     part = 100.0 * holds.sum() / max(int(reached.sum()), 1)
     poses = str(dataset.attrs["poses"])
     tension = "" if "minimum" in dataset.dims else f", tensions from {_least(dataset)} N"
-    return f"{poses[:1].upper()}{poses[1:]}{tension}; {part:.3g} % hold"
+    return f"{poses[:1].upper()}{poses[1:]}{tension}; {part:.3g}\xa0% hold"
 
 
 def _least(dataset: xarray.Dataset) -> str:

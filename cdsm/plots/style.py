@@ -76,12 +76,15 @@ MM: Final = 1e3
 KN: Final = 1e-3
 N_PER_MM: Final = 1e-3
 
+STYLE: Final = Path(__file__).with_name("cdsm.mplstyle")
+"""Style sheet of all pictures; ``plt.style.use(cdsm.plots.STYLE)`` takes it for pictures of one's
+own."""
+
 NOTE_SIZE: Final = 6.5
 """Size of small text [points]."""
 
 _LINE = 8.0  # least distance of names below each other [points]
 _CHARACTERS = 16.0  # of a title in an inch
-_FILE: Final = Path(__file__).with_name("cdsm.mplstyle")
 _DATELESS: Final = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}, ".png": None}
 _ROOM = 1.15  # upper limit of an axis that begins at zero, over the largest value drawn
 _STEPS: Final = (1, 2, 2.5, 5, 10)
@@ -93,7 +96,7 @@ def styled(draw: Callable[P, Picture]) -> Callable[P, Picture]:
 
     @functools.wraps(draw)
     def drawn(*args: P.args, **options: P.kwargs) -> Picture:
-        with rc_context(fname=_FILE):
+        with rc_context(fname=STYLE):
             picture = draw(*args, **options)
             for ax in np.ravel(np.array(picture, dtype=object)):
                 keep_ticks(ax)
@@ -125,7 +128,7 @@ def save_figure(figure: Figure | Axes | Panels, path: str | os.PathLike[str]) ->
     if suffix not in _DATELESS:
         raise InvalidInput("path", f"{str(path)!r} given; it must end in {', '.join(_DATELESS)}.")
     sheet = figure if isinstance(figure, Figure) else figure_of(figure)
-    with rc_context(fname=_FILE):
+    with rc_context(fname=STYLE):
         return write_file(path, lambda aside: sheet.savefig(aside, metadata=_DATELESS[suffix]))
 
 
