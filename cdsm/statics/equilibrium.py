@@ -193,7 +193,7 @@ class Equilibrium(Result):
         elif self.neutral:
             sentence = "NEUTRAL: a motion of the joints meets hardly any resistance"
             yield Finding(Status.NEUTRAL, sentence)
-        yield from find_stops(self.at_limit, arm.nv)
+        yield from find_stops(arm, self.at_limit)
         yield from find_doubts(self.pose)
         imbalance = imbalance_of(self.pose, self.tension, self.wrench, self.residual)
         yield from find_imbalance(arm, imbalance, self.residual)

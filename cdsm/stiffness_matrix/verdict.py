@@ -168,18 +168,21 @@ def find_excess(arm: Manipulator, tension: Array, maximum: float = math.inf) -> 
         yield Finding(Status.ABOVE_MAXIMUM, sentence, label)
 
 
-def find_stops(joints: Sequence[str], count: int) -> Iterator[Finding]:
-    """Yield which joints rest on their stops, of ``count`` that the arm has."""
+def find_stops(arm: Manipulator, joints: Sequence[str]) -> Iterator[Finding]:
+    """Yield which ``joints`` of the arm rest on their stops; their number, if they are many."""
     if not joints:
         return
-    label = f"rests on the stop of {listed(joints, _NAMED)}"
+    bends = [name for name in arm.joint_names if "_bend" in name]  # of a backbone, which may twist
+    of_bends = set(joints) <= set(bends)
+    every = plural(len(bends), "bend") if of_bends else plural(arm.nv, "joint")
     if len(joints) <= MOST_JOINTS:
+        label = f"rests on the stop of {listed(joints, _NAMED)}"
         verb = "rests on its stop" if len(joints) == 1 else "rest on their stops"
         sentence = f"{listed(joints, MOST_JOINTS)} {verb}"
-    elif len(joints) < count:
-        sentence = f"{len(joints)} of {plural(count, 'joint')} rest on their stops"
+    elif len(joints) < (len(bends) if of_bends else arm.nv):
+        sentence = label = f"{len(joints)} of {every} rest on their stops"
     else:
-        sentence = label = f"all {plural(count, 'joint')} are at their stops"
+        sentence = label = f"all {every} are at their stops"
     yield Finding(Status.AT_STOP, sentence, label)
 
 

@@ -204,3 +204,17 @@ def test_motors_that_hold_tensions_need_no_law_below_its_domain() -> None:
         history = cdsm.load_cycle(rest.pose, rest, [load])
         moved = cdsm.forward_statics(arm, tension=rest.tension, wrench=load)
         np.testing.assert_allclose(history.tip[0], moved.pose.tip[:3, 3], atol=1e-9)
+
+
+def test_backbone_with_all_bends_at_their_stops_is_told_in_one_line() -> None:
+    """The tip can move as the rod twists; along the bent rod it is locked, and has no number."""
+    sizes = {"length": 0.3, "disks": 8, "hole_angles": [0.0, 2.1, 4.2], "hole_radius": 0.01}
+    geometry = cdsm.Geometry.backbone(sections=[sizes], bending_stiffness=0.02)
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e4))
+    rest = cdsm.forward_statics(arm, tension=[400.0, 0.0, 0.0])
+    assert len(rest.at_limit) == 32
+    assert rest.verdict.status is cdsm.Status.AT_STOP
+    assert rest.verdict.heading.startswith("all 32 bends are at their stops")
+    lines = str(rest).splitlines()
+    assert sum("stop" in line and "on the way" not in line for line in lines) == 1
+    assert any("those joints fixed: (locked, " in line for line in lines)
