@@ -15,7 +15,7 @@ from cdsm.posture import Posture
 from cdsm.statics.buckling import critical_load
 from cdsm.statics.continuation import follow, stage_at
 from cdsm.statics.equilibrium import equilibrium
-from cdsm.statics.events import Event, Kind, events_on, events_text, watched
+from cdsm.statics.events import Event, Kind, events_on, events_text, mass_of, watched
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
@@ -28,7 +28,6 @@ _ENDS: tuple[Kind, ...] = ("maximum", "law", "stop", "buckling")  # events that 
 _SAG = 0.05  # displacement over the arm's length at the first load of the search
 _DOUBLINGS = 20  # most doublings of this load
 _INSIDE = 1e-9  # relative distance from the ends of a law: rounding may put a tension beyond
-_ALONG = 1e-9  # 1 − cosine of the largest angle between a weight and gravity
 _AT_BOUND = 1e-5  # distance from a bound that it is active at, over the largest tension
 _BELOW = 1e-7  # the bounds that limit a force are read at this part below it
 
@@ -62,14 +61,6 @@ class Holding(Result):
         mass = "" if self.mass is None else f" ({self.mass:.4g} kg)"
         line = f"{motors}: {self.force:.4g} N{mass}, limit: {self.limit}"
         return "\n".join([line, *(f"  {text}" for text in events_text(self.events[:-1]))])
-
-
-def mass_of(pose: Posture, u: Array, force: float) -> float | None:
-    """Return the mass [kg] whose weight is ``force`` [N] along u; None if u is not gravity's."""
-    g = float(np.linalg.norm(pose.arm.gravity))
-    if g == 0.0 or u @ pose.arm.gravity < (1.0 - _ALONG) * g:
-        return None
-    return force / g
 
 
 def holding_following(
@@ -160,7 +151,7 @@ def _holding(
     limit: str,
     events: tuple[Event, ...],
 ) -> Holding:
-    mass = mass_of(pose, u, force)
+    mass = mass_of(pose.arm, u, force)
     if 0.0 < force < math.inf:
         events = tuple(replace(event, share=event.load / force) for event in events)
     return Holding(motors=motors, force=force, mass=mass, limit=limit, events=events)

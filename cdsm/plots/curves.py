@@ -311,13 +311,18 @@ def plot_weight_test(test: WeightTest, ax: Axes | None = None, *, title: str | N
         panel.plot(smooth, loads, color=style.SKY, lw=0.9, gid="frictionless", label="no friction")
         panel.plot([], [], color=style.BLUE, lw=1.4, label="with friction")
         panel.legend(loc="lower right")
-    panel.plot(moved, loads, ".-", color=style.BLUE, lw=1.4, ms=3.0, gid="test")
+    at_events = np.array([event.load for event in test.events])
+    bends = MM * test.event_displacements @ u
+    order = np.argsort(np.append(loads, at_events), kind="stable")
+    curve = np.append(moved, bends)[order], np.append(loads, at_events)[order]
+    panel.plot(*curve, "-", color=style.BLUE, lw=1.4, gid="curve")
+    panel.plot(moved, loads, ".", color=style.BLUE, ms=3.0, gid="test")
     panel.margins(x=0.08)
     along = f"displacement of the tip along {style.direction_name(u)} [mm]"
     panel.set(xlabel=along, ylabel="weight [N]")
     events = [
-        _Mark(float(np.interp(event.load, loads, moved)), event.load, event.kind, str(event))
-        for event in test.events
+        _Mark(float(displacement), event.load, event.kind, str(event))
+        for event, displacement in zip(test.events, bends, strict=True)
     ]
     _draw_events(panel, events)
     question = f"how far does {force:.4g} N move its tip?"

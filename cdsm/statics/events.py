@@ -16,6 +16,7 @@ from typing import Final, Literal, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.manipulator import Manipulator
 from cdsm.statics.continuation import (
     Model,
     Stage,
@@ -29,11 +30,10 @@ from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import Point
 from cdsm.support.values import Array, frozen
 
-Kind = Literal["slack", "slip", "stop", "maximum", "law", "buckling"]
+Kind = Literal["slack", "stop", "maximum", "law", "buckling"]
 
 _WORDS: Final[dict[Kind, str]] = {
     "slack": "{} goes slack",
-    "slip": "{} begins to slide",
     "stop": "{} reaches its stop",
     "maximum": "{} passes its maximum tension",
     "law": "{} leaves the domain of its law",
@@ -42,6 +42,7 @@ _WORDS: Final[dict[Kind, str]] = {
 _ROUNDING = 1e-9  # a quantity below this part of its scale is zero
 _NEAR = 1e-9  # distance of both sides of an event, as a part of the step
 _JUMP = 1e4  # a quantity jumps at an event if it changes there by more than so many roundings
+_ALONG = 1e-9  # 1 − cosine of the largest angle between a weight and gravity
 _DEPTH = 4  # most halvings of a step in which a quantity may dip below zero
 _RATE = 1e-6  # change of the share for a difference
 _PRECISION = 1e-15  # of shares, relative to their step
@@ -53,13 +54,12 @@ class Event:
     """What changes how an arm carries a growing load, and the load at which it does.
 
     Attributes:
-        kind: ``"slack"``: a cable loses its tension; ``"slip"``: a cable begins to slide in a hole
-            in which it stuck; ``"stop"``: a joint reaches its limit; ``"maximum"``: a tension
-            passes the largest one of its cable; ``"law"``: a tension leaves the domain of the law
-            of its wire; ``"buckling"``: K_θ is no longer positive definite.
-        place: Name of the cable, joint or hole; for buckling, of the joint that moves most.
-        share: Share of the load (and pull) [-]; of a load cycle, the number of the load, counted
-            as its rows are: 2.5 is half-way between loads 2 and 3, −1 the reference.
+        kind: ``"slack"``: a cable loses its tension; ``"stop"``: a joint reaches its limit;
+            ``"maximum"``: a tension passes the largest one of its cable; ``"law"``: a tension
+            leaves the domain of the law of its wire; ``"buckling"``: K_θ is no longer positive
+            definite.
+        place: Name of the cable or joint; for buckling, of the joint that moves most.
+        share: Share of the load (and pull) [-].
         load: Magnitude of the growing force [N]; 0 if no force grows.
     """
 
@@ -141,6 +141,14 @@ def watched(arm: LockedArm, maximum: Array | None = None) -> Watched:
         return np.append(np.full(count, size), np.ones(2 * len(joints)))
 
     return Watched(tuple(kinds), tuple(places), value, scale)
+
+
+def mass_of(arm: Manipulator, u: Array, force: float) -> float | None:
+    """Return the mass [kg] whose weight is ``force`` [N] along u; None if u is not gravity's."""
+    g = float(np.linalg.norm(arm.gravity))
+    if g == 0.0 or u @ arm.gravity < (1.0 - _ALONG) * g:
+        return None
+    return force / g
 
 
 def events_on(

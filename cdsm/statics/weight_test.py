@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import final
 
@@ -12,9 +13,9 @@ from numpy.typing import ArrayLike
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.posture import Posture
-from cdsm.statics.continuation import Model, Stage, follow, stage_at
+from cdsm.statics.continuation import Model, Stage, equilibrium_near, follow, stage_at
 from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, equilibrium
-from cdsm.statics.events import Event, Watched, events_on, events_text, watched
+from cdsm.statics.events import Event, Watched, events_on, events_text, mass_of, watched
 from cdsm.statics.load_cycle import LoadHistory, load_cycle
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.stiffness_matrix.prints import frictionless_model
@@ -46,8 +47,10 @@ class WeightTest(Result, Plotted):
             that slides first; None for an arm without friction, and if the test goes on from a
             rest with friction: there some cables are about to slide already.
         history: States with friction; load 0 is the arm without the weight. None without friction.
-        events: What changes how the arm carries the weight, in the order of the loads; with
-            friction where there is some.
+        events: What changes how the arm carries the weight, in the order of the loads: cables that
+            go slack, stops, maxima, ends of laws. Empty with friction, where ``breakaway``,
+            :attr:`sliding_load` and ``history.sliding`` say when cables slide.
+        event_displacements: Displacement of the tip at each event (m, 3) [m], as ``displacements``.
     """
 
     _headline = "stiffness"
@@ -60,6 +63,9 @@ class WeightTest(Result, Plotted):
     breakaway: Breakaway | None = None
     history: LoadHistory | None = None
     events: tuple[Event, ...] = field(default=(), metadata=unit("1"))
+    event_displacements: Array = field(
+        default_factory=lambda: frozen(np.empty((0, 3))), metadata=unit("m", "event", "axis")
+    )
 
     @property
     def _posture(self) -> Posture:
@@ -293,10 +299,16 @@ def weight_test(
         branch += way[1:]
         here = way[-1]
         if here.share < goal:
-            raise _buckled(model, branch, watch, size)
+            raise _buckled(model, branch, watch, force)
         states.append(as_equilibrium(model(goal), here.point))
     events = events_on(model, branch, watch, size, 1.0)
-    test = WeightTest(force=force, unloaded=unloaded, states=tuple(states[1:]), events=events)
+    test = WeightTest(
+        force=force,
+        unloaded=unloaded,
+        states=tuple(states[1:]),
+        events=events,
+        event_displacements=_displacements(model, branch, events),
+    )
     if math.isinf(test.frictionless) and math.isfinite(test.tangent):
         problem = f"{np.abs(force).max():.3g} N moves the tip by rounding only; hang at least "
         raise InvalidInput("force", f"{problem}{_MEASURED * pose.arm.length * test.tangent:.1g} N.")
@@ -312,12 +324,25 @@ def weight_test(
     )
 
 
-def _buckled(model: Model, branch: list[Stage], watch: Watched, force: float) -> EquilibriumError:
-    """Return the error of an arm that buckles before it bears ``force`` [N]."""
-    *events, end = events_on(model, branch, watch, force, 1.0)
+def _displacements(model: Model, branch: list[Stage], events: Sequence[Event]) -> Array:
+    """Return how far the tip has moved on a branch (m, 3) [m] at each of its events."""
+    tips = list[Array]()
+    for event in events:
+        near = min(branch, key=lambda stage: abs(stage.share - event.share))
+        stage = equilibrium_near(model, event.share, near) or near
+        tips.append(stage.pose.tip[:3, 3] - branch[0].pose.tip[:3, 3])
+    return frozen(np.array(tips).reshape(-1, 3))
+
+
+def _buckled(model: Model, branch: list[Stage], watch: Watched, force: Array) -> EquilibriumError:
+    """Return the error of an arm that buckles before it bears ``force`` (3,) [N]."""
+    size = float(np.linalg.norm(force))
+    *events, end = events_on(model, branch, watch, size, 1.0)
     before = f" ({'; '.join(map(str, events))})" if events else ""
     motors = "motors that hold tensions" if branch[-1].arm.tension_held else "locked motors"
-    where = f"at {100.0 * end.share:.4g} % of the load, under {end.load:.4g} N"
+    mass = mass_of(branch[-1].pose.arm, force / size, end.load)
+    weight = f"{end.load:.4g} N" + ("" if mass is None else f" ({mass:.4g} kg)")
+    where = f"at {100.0 * end.share:.4g} % of the load, under {weight}"
     residual = branch[-1].point.state.residual
     return EquilibriumError(
         f"with {motors} the arm buckles {where}: {end.place} buckles{before}",

@@ -105,10 +105,15 @@ def test_weight_goes_up_with_the_displacement_and_events_stand_at_their_loads(
     assert slope[1] / slope[0] == pytest.approx(1e-3 * test.tangent)
     slack = [event for event in test.events if event.kind == "slack"]
     assert slack
+    curve = line(ax, "curve")
+    assert len(curve) == len(loads) + len(test.events)
+    assert (np.diff(curve[:, 1]) >= 0.0).all()
     for event in slack:
         (x, y) = line(ax, f"event:{event}")[0]
         assert y == event.load
-        assert x == pytest.approx(np.interp(event.load, loads, moved))
+        assert [x, y] in curve.tolist()  # the curve has its kink there, not at the next step
+        exact = cdsm.weight_test(slender, tension, [0.0, 0.0, -event.load])
+        assert x == pytest.approx(-1e3 * exact.displacement[2], rel=1e-9)
         before = cdsm.weight_test(slender, tension, [0.0, 0.0, 0.01 - event.load], steps=2)
         assert before.tensions[-1][slender.arm.cables.names.index(event.place)] > 0.0
     assert f"{slack[0]}" in [text.get_text() for text in ax.texts]

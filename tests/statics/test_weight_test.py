@@ -89,6 +89,12 @@ def test_buckling_under_the_load_says_at_which_part_of_it(steps: int) -> None:
     cdsm.weight_test(pose, [20.0, 20.0], [-15.9, 0.0, 0.0], steps=steps)
 
 
+def test_buckling_under_a_weight_says_its_mass() -> None:
+    pose = soft_hinge(limit=1.2).with_gravity([-9.81, 0.0, 0.0]).at([0.0])
+    with pytest.raises(cdsm.EquilibriumError, match=r"under 16 N \(1\.631 kg\)"):
+        cdsm.weight_test(pose, [20.0, 20.0], [-20.0, 0.0, 0.0])
+
+
 def test_arm_that_snaps_through_has_buckled() -> None:
     # where bending softens the hinge, a small moment makes it snap before the straight one buckles
     moment, pretension = 2e-3, 150.0
