@@ -149,7 +149,7 @@ def sweep_postures(
     """Compute the stiffness over many postures, or over the tension at one; write a table, a map.
 
     The table has an entry with a status for each posture and each lower bound of the tensions. The
-    text has quantiles, and says why postures have no tensions. With --angles and several lower
+    text has quantiles, and says why postures have no stiffness. With --angles and several lower
     bounds, it is the stiffness over the tension, and --figure draws the curve.
 
     Exit code 0; 3 if no entry has the status ok, or the map is empty.
@@ -158,6 +158,7 @@ def sweep_postures(
     from cdsm.support.status import status_names
     from cdsm.support.validation import XYZ
     from cdsm.sweeps.cases import DEFAULT
+    from cdsm.sweeps.failing import explain_outside, explain_unstable
     from cdsm.sweeps.files import write_sweep
     from cdsm.sweeps.infeasible import explain_infeasible
     from cdsm.sweeps.poses import joint_angles
@@ -207,25 +208,33 @@ def sweep_postures(
         lines.append(share)
         numbers |= {"largest_share_of_breaking_force": share}
     lines += curve_lines(dataset.isel(pose=0)) if at_one else quantile_lines(dataset)
-    least = min(low)
-    status = status.reshape(-1, len(low))[:, low.index(least)]
-    causes = None
+    causes: Json = {}
+    explanations = {
+        cdsm.Status.INFEASIBLE: explain_infeasible,
+        cdsm.Status.OUTSIDE_ELASTICITY: explain_outside,
+        cdsm.Status.UNSTABLE: explain_unstable,
+    }
+    status = status.reshape(-1, len(low))
     if len(status) <= _EXPLAINED:
         q = dataset["q"].values if plane is not None else joint_angles(robot, postures)
-        q = q.reshape(-1, robot.nv)
-        worst = worst_friction
-        causes = explain_infeasible(robot, q, status, least, maximum, wrench, worst_friction=worst)
-    if causes is not None:
-        lines.append(f"{causes}" + (f" (least tension {least:g} N)" if len(low) > 1 else ""))
+        for cause, explain in explanations.items():
+            # at the lower bound with most of such postures; INFEASIBLE at the least one
+            count = (status == cause).sum(axis=0)
+            least = cause == cdsm.Status.INFEASIBLE
+            at = low.index(min(low)) if least else int(count.argmax())
+            entries_there = (robot, q.reshape(-1, robot.nv), status[:, at])
+            bounds = (low[at], maximum, wrench)
+            kind = explain(*entries_there, *bounds, worst_friction=worst_friction)
+            if kind is not None:
+                causes[f"{cause.word}_postures"] = kind.to_dict()
+                lines.append(f"{kind}" + f" (least tension {low[at]:g} N)" * (len(low) > 1))
     if figure is not None:
         draw = cdsm.plots.plot_tension_curve if at_one else cdsm.plots.plot_map
         write_picture(figure, lambda: draw(dataset, shown))
         if bool(dataset[shown].isnull().all()):
             warnings.append(f"{shown} exists at none of {entries} entries")
     lines += [f"written: {file}" for file in written]
-    results: Json = {"entries": counts, "written": written}
-    if causes is not None:
-        results["infeasible_postures"] = causes.to_dict()
+    results: Json = {"entries": counts, "written": written} | causes
     return answer(as_json, numbers | results, head, "\n".join(lines), warnings=warnings)
 
 

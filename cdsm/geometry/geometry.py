@@ -161,7 +161,7 @@ class Geometry(Printed):
         joints = plural(len(self.joints), "joint")
         cables = plural(len(self.cables), "cable")
         freedom = plural(len(self.chain.axes), "degree")
-        return f"{self.name}: {joints} ({freedom} of freedom), {cables}, {self.length:g} m long"
+        return f"{self.name}: {joints} ({freedom} of freedom), {cables}, {self.length:.4g} m long"
 
     def __repr__(self) -> str:
         return f"<Geometry {self}>"

@@ -17,6 +17,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.status import Status
 from cdsm.support.format import place, plural
 from cdsm.support.values import Array
+from cdsm.sweeps.failing import spread
 from cdsm.sweeps.poses import RandomPoses, joint_angles
 from cdsm.tension import distribute_tension
 
@@ -24,7 +25,6 @@ _BALANCED: Final = (
     *(Status.OK, Status.OUTSIDE_ELASTICITY, Status.SINGULAR),
     *(Status.IMMOBILE, Status.UNSTABLE),
 )
-_EXAMINED: Final = 64  # postures of which the missing torque is computed, some milliseconds each
 _TRIED: Final = 256  # random postures at which a joint limit is tried
 _HELD: Final = 0.95  # least share of them that must have tensions
 _MANY: Final = 0.05  # least share of postures beyond an angle that is worth a word
@@ -83,7 +83,7 @@ class InfeasiblePostures:
             if self.beyond[j] >= _MANY * self.postures
         ]
         if ends:
-            lines.append(f"  no posture has tensions with {listed(ends, 4, ', or ')}")
+            lines.append(f"  no posture has tensions with {', or '.join(ends[:4])}")
         if self.limit is not None:
             within = f"within {place(self.limit, 'rad')} of every joint, {100.0 * self.share:.3g} %"
             remedy = f": try joint_limit = {self.limit:g}" if self.arm.is_serpentine else ""
@@ -119,8 +119,8 @@ def explain_infeasible(
     joints = Counter[str]()
     cables = Counter[str]()
     widened = 0
-    chosen = rows[np.unique(np.linspace(0, len(rows) - 1, _EXAMINED).astype(int))]
-    for row in chosen.tolist():
+    chosen = spread(rows)
+    for row in chosen:
         try:
             distribute_tension(
                 arm.at(q[row]), minimum, maximum, wrench, worst_friction=worst_friction

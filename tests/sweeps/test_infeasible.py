@@ -79,9 +79,10 @@ def test_the_curve_shows_the_least_tension_that_held_and_the_stiffness_there() -
     arm = cdsm.Manipulator.read(SNAKE)
     q = np.full((1, 12), np.deg2rad(8.0))
     dataset = cdsm.sweep(arm, q, minimum=[40.0, 5.0, 20.0])
-    (axes,) = cdsm.plots.plot_tension_curve(dataset).axes
+    panels = cdsm.plots.plot_tension_curve(dataset)
     along = dataset["along"].sel(minimum=[5.0, 20.0, 40.0]).values[0]
-    for line, values in zip(axes.lines, along.T, strict=True):
+    for ax, values in zip(panels, along.T, strict=True):
+        (line,) = ax.lines
         np.testing.assert_allclose(line.get_xdata(), [10.0, 20.0, 40.0])
         np.testing.assert_allclose(line.get_ydata(), 1e-3 * values)
     several = cdsm.sweep(arm, np.zeros((2, 12)), minimum=[5.0, 20.0])
