@@ -286,12 +286,6 @@ def test_new_writes_the_arm_of_the_readme(tmp_path: Path) -> None:
     sizes: dict[str, Any] = {"link_length": 0.06, "base_length": 0.03, "disk_offset": 0.012}
     sizes |= {"hole_radius": 0.025, "link_mass": 0.12, "lead": 0.3, "joints": 4}
     sizes["joint_limit"] = 0.35
-        "hole_radius": 0.025,
-        "link_mass": 0.12,
-        "lead": 0.3,
-        "joints": 4,
-        "joint_limit": 0.35,
-    }
     arm = cdsm.Manipulator.read(path)
     assert arm.geometry == cdsm.Geometry.universal(cables_per_joint=3, **sizes)
     assert {cable.minimum for cable in arm.cables} == {10.0}
