@@ -93,6 +93,9 @@ class DesignProblem(ReadOnlyState):
             postures = frozen(number_array("postures", postures))
         joint_angles(self.arm, postures)  # raises for a wrong shape
         checked_bounds(self.arm, self.minimum, self.maximum)
+        for variable in variables:
+            if variable.kind == "minimum":
+                _require_below_maximum(variable, self.arm, self.maximum)
         asked = {measure.of for measure in (*objectives, *constraints)}
         require(asked, self.arm, self.maximum, self.worst_friction, self.diameter)
         if "deflection" in asked and not loads[:, :3].any(axis=1).all():
@@ -223,6 +226,17 @@ class DesignProblem(ReadOnlyState):
         lines += [f"  {objective.goal}: {objective.words}" for objective in self.objectives]
         lines += [f"  {constraint.words}: {constraint.asked}" for constraint in self.constraints]
         return "\n".join(lines)
+
+
+def _require_below_maximum(variable: Variable, arm: Manipulator, maximum: float) -> None:
+    """Raise InvalidInput unless all values of the ``variable`` minimum [N] leave some tension."""
+    ends = [float(end) for end in (variable.high, *variable.choices) if end is not None]
+    limits = {cable.name: min(cable.maximum, maximum) for cable in arm.cables}
+    cable = min(limits, key=limits.__getitem__)
+    if max(ends) > limits[cable]:
+        problem = f"is a variable of up to {max(ends):g} N, but the maximum of {cable} is"
+        remedy = f"{limits[cable]:g} N; end it there or below, or raise the maximum."
+        raise InvalidInput("minimum", f"{problem} {remedy}")
 
 
 def _require_compatible(variables: Sequence[Variable], arm: Manipulator) -> None:

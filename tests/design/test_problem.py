@@ -244,6 +244,11 @@ def test_an_infeasible_problem_is_named() -> None:
             },
             "vary hole_angle@cable10_1 or end@cable10_1",
         ),
+        (
+            {"variables": (cdsm.Variable("minimum", 10.0, 450.0),)},
+            "minimum: is a variable of up to 450 N, but the maximum of cable1_1 is 400 N; end it",
+        ),
+        ({"variables": (cdsm.Variable("minimum", choices=(10, 401)),)}, "of up to 401 N"),
         ({"loads": np.zeros((1, 5))}, "loads: shape"),
         ({"objectives": (cdsm.Objective("force_radius"),), "maximum": np.inf}, "a finite one"),
         (
