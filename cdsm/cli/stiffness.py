@@ -41,7 +41,7 @@ def show_stiffness(
         bool, opt("Print a report: right, in balance, stable?", None, "--check")
     ] = False,
     out: Annotated[
-        Path | None, file_opt("Page of the report to write.", "FILE.html", "--out")
+        Path | None, file_opt("Report to write, as a page or as text.", "FILE.html|txt", "--out")
     ] = None,
     as_json: options.JsonOption = False,
 ) -> int:
@@ -54,7 +54,6 @@ def show_stiffness(
     Exit code 0; 3 if the arm is unstable, or the report of --check fails.
     """
     from cdsm.cable import largest_share
-    from cdsm.support.files import write_text
 
     robot = options.load_arm(arm, changes)
     wrench = options.load_at_tip(robot, load, mass)
@@ -75,7 +74,7 @@ def show_stiffness(
     if check or out is not None:
         report = (rest or K).report()
         about = f"{arm}\n{head}\ncdsm {cdsm.__version__}"
-        write(out, lambda file: write_text(file, report.to_html(about)))
+        write(out, lambda file: report.write(file, about, direction and axes[direction]))
         failed = () if report.passed else (f"{report.outcome}: the report says why.",)
         output = numbers | report.to_dict() | uncertainty
         return answer(as_json, output, head, report, *lines, *sure, warnings=failed)

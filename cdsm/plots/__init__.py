@@ -29,6 +29,7 @@ from cdsm.plots.measured import plot_identification as plot_identification
 from cdsm.plots.measured import plot_monte_carlo as plot_monte_carlo
 from cdsm.plots.measured import plot_tensile_fit as plot_tensile_fit
 from cdsm.plots.measured import plot_uncertainty as plot_uncertainty
+from cdsm.plots.page import draw_report as draw_report
 from cdsm.plots.paper import plot_paper as plot_paper
 from cdsm.plots.paths import plot_force_polytope as plot_force_polytope
 from cdsm.plots.paths import plot_modes as plot_modes

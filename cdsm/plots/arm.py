@@ -62,6 +62,7 @@ def plot_arm(
     scale: float | None = None,
     names: bool = False,
     triad: bool = True,
+    warnings: bool = True,
     title: str | None = None,
 ) -> Axes:
     """Plot an arm in mm: backbone, disks, cables, how a load moves its tip; return the axes.
@@ -85,6 +86,7 @@ def plot_arm(
         scale: By which displacements of the outline are enlarged; None: a round number.
         names: Whether to write the names of the cables at their ends.
         triad: Whether to draw the base axes.
+        warnings: Whether to write the warnings of the stiffness or the equilibrium below the arm.
         title: Title; None: the arm's name and the question that the picture answers.
 
     Raises:
@@ -115,7 +117,7 @@ def plot_arm(
             style.color_bar_beside(panel, colors, "N")
     if scene.before is not None:
         notes.append(("pale: the reference, at which the motors were locked", style.SOFT))
-    for warning in scene.warnings:
+    for warning in scene.warnings if warnings else ():
         lines = textwrap.wrap(warning, _CHARACTERS, max_lines=_NOTES, placeholder=" …")
         notes += [(line, style.VERMILLION) for line in lines]
     for line, (text, color) in enumerate(notes):

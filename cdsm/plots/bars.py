@@ -26,6 +26,7 @@ _BAR = 0.74  # thickness of a bar, over the distance of two rows
 _GAP = 0.45  # between cables of two joints
 _ROW = 0.125  # height of a row [inch]
 _LARGE = 0.02  # shares below this part of the total are written in grey
+_LONGEST = 24  # characters of a name beside a bar; of a longer one the middle is left out
 _MOST_ROWS = 72  # of more cables every second, third, … row has a name
 
 
@@ -142,12 +143,18 @@ def _rows(ax: Axes | None, names: Sequence[str], others: Iterable[str] = ()) -> 
     y = np.arange(len(labels)) + _GAP * breaks
     panel = style.panel(ax, 0.85 + _ROW * (y[-1] + 1.2))
     step = -(-len(labels) // _MOST_ROWS)
-    panel.set_yticks(y[::step], labels[::step], fontsize=style.NOTE_SIZE, parse_math=False)
+    shown = [_shortened(label) for label in labels[::step]]
+    panel.set_yticks(y[::step], shown, fontsize=style.NOTE_SIZE, parse_math=False)
     panel.tick_params("y", length=0, pad=2)
     panel.set_ylim(y[-1] + 0.7, -0.7)
     panel.grid(visible=False, axis="y")
     panel.spines["left"].set_visible(False)
     return panel, y
+
+
+def _shortened(name: str) -> str:
+    half = _LONGEST // 2
+    return name if len(name) <= _LONGEST else f"{name[: half - 1]}…{name[-half:]}"
 
 
 def _height(panel: Axes) -> float:

@@ -52,6 +52,13 @@ def _existing(read: Callable[[], object]) -> object:
 
 def table(K: Stiffness) -> list[str]:
     """Return the lines of the printed table: readings along x, y and z, of the softer sides."""
+    return [
+        f"{name:<24}{''.join(f'{cell:>12}' for cell in cells)}" for name, *cells in table_rows(K)
+    ]
+
+
+def table_rows(K: Stiffness) -> list[tuple[str, ...]]:
+    """Return the rows of the table of readings, of which the first has the titles of columns."""
     axes = np.eye(3)
     sprung = K.posture.arm.has_springs
     cables = ("passive", "active")
@@ -75,8 +82,7 @@ def table(K: Stiffness) -> list[str]:
     along = "along, softer side" if K.slack else "along"
     names = [along, *(f"  of it {part}" for part in parts), "cartesian, diagonal"]
     names = [f"stiffness [{unit}]", *names, "pseudoinverse, diagonal"]
-    lines = zip(names, ["xyz", *cells], strict=True)
-    return [f"{name:<24}{''.join(f'{cell:>12}' for cell in row)}" for name, row in lines]
+    return [(name, *row) for name, row in zip(names, ["xyz", *cells], strict=True)]
 
 
 def notes(K: Stiffness) -> tuple[str, ...]:

@@ -1,22 +1,26 @@
 """The report on a stiffness as a frozen value; :mod:`cdsm.report` computes it.
 
-It is printed as text and as HTML, both by rich.
+It is printed as text by rich; :mod:`cdsm.plots` draws it as a page.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from io import StringIO
+from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, final
 
+from cdsm.errors import InvalidInput
+from cdsm.support.files import as_path, write_text
 from cdsm.support.format import merged, prepare_json, rounded
 from cdsm.support.result import Result, unit
+from cdsm.support.values import draw
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from cdsm.stiffness_matrix.value import Stiffness
+    from cdsm.support.validation import Direction
 
 Outcome = Literal["PASS", "NOT CHECKED", "FAIL"]
 
@@ -136,20 +140,71 @@ class Report(Result):
         parts = prepare_json(verdict | comparisons | remedies), super().to_dict()
         return merged(self.stiffness.to_dict(), *parts)
 
-    def to_html(self, about: str = "") -> str:
-        """Return the report as a self-contained HTML page; ``about`` is text below the title."""
-        return _printed(self, about).export_html()
+    @property
+    def judgement(self) -> str:
+        """What the outcome means, as a sentence."""
+        return _OUTCOMES[self.outcome]
+
+    @property
+    def model(self) -> str:
+        """What K_θ is, and in which axes it is read."""
+        sentence = (
+            "K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle. F is tension, the "
+            "cables' torque −J_Lᵀ F, the wrench W a dead load; readings are in base axes."
+        )
+        arm = self.stiffness.posture.arm
+        if not arm.slides.any():
+            return sentence
+        lever = f"Sliding joints count with the arm's length, {arm.length:.4g} m, as lever."
+        return f"{sentence}\n{lever}"
+
+    def to_html(self, about: str = "", direction: Direction | None = None) -> str:
+        """Return the report as a self-contained HTML page with pictures, without scripts.
+
+        Args:
+            about: Text below the title.
+            direction: Direction of shares, curve and uncertainty: an axis such as ``"z"``, or (3,)
+                in base axes, any length; None: the softest of x, y and z.
+
+        Raises:
+            InvalidInput: The direction is invalid.
+        """
+        page: str = draw("draw_report", self, about=about, direction=direction)
+        return page
+
+    def write(
+        self, path: str | os.PathLike[str], about: str = "", direction: Direction | None = None
+    ) -> Path:
+        """Write the report; return the path.
+
+        The file is a page (``.html``, :meth:`to_html`), text (``.txt``), or the numbers as a table
+        (``.csv``) or Dataset (``.nc``). ``about`` is text below the title of page and text.
+
+        Raises:
+            InvalidInput: The path has another ending, or the direction is invalid.
+            CdsmError: pandas, xarray or netCDF4 is not installed.
+            FileError: The file cannot be written.
+        """
+        suffix = as_path(path).suffix.lower()
+        if suffix == ".html":
+            return write_text(path, self.to_html(about, direction))
+        if suffix == ".txt":
+            return write_text(path, f"{_text(self, about)}\n")
+        if suffix not in (".csv", ".nc"):
+            problem = f"{str(path)!r} given; it must end in .html, .txt, .csv or .nc."
+            raise InvalidInput("path", problem)
+        return super().write(path)
 
     def __repr__(self) -> str:
         name = self.stiffness.posture.arm.name
         return f"<Report on the stiffness of {name}: {self.outcome}>"
 
     def __str__(self) -> str:
-        return "\n".join(map(str.rstrip, _printed(self).export_text().splitlines()))
+        return _text(self)
 
 
-def _printed(report: Report, about: str = "") -> Console:
-    """Return a console that has recorded the report; ``about`` is text below the title."""
+def _text(report: Report, about: str = "") -> str:
+    """Return the report as text; ``about`` is text below the title."""
     from rich.console import Console  # slow to import
     from rich.table import Table
 
@@ -162,35 +217,27 @@ def _printed(report: Report, about: str = "") -> Console:
         emoji=False,
         highlight=False,
     )
-    console.print(f"Stiffness check: {report.stiffness.posture.arm.name}", style="bold")
+    console.print(f"Stiffness check: {report.stiffness.posture.arm.name}")
     if about:
         console.print(about)
-    console.print(f"{report.outcome}: {_OUTCOMES[report.outcome]}", style="bold")
-    for fault in report.faults:
-        console.print(f"! {fault}", style="red")
-    for reason in report.unchecked:
-        console.print(f"? {reason}", style="dark_orange")
-    for note in report.notes:
-        console.print(f"- {note}")
+    console.print(f"{report.outcome}: {report.judgement}")
+    for mark, sentences in (("!", report.faults), ("?", report.unchecked), ("-", report.notes)):
+        for sentence in sentences:
+            console.print(f"{mark} {sentence}")
     console.print(f"\n{report.stiffness}\n")
-    for head, *rows in _tables(report):
-        table = Table(box=None, header_style="bold", pad_edge=False)
+    for head, *rows in tables(report):
+        table = Table(box=None, pad_edge=False)
         for i, title in enumerate(head):
             table.add_column(title, justify="right" if i else "left", no_wrap=True)
         for row in rows:
             table.add_row(*row)
         console.print(table)
         console.print()
-    console.print(
-        "K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle. F is tension, the cables' "
-        "torque −J_Lᵀ F, the wrench W a dead load; readings are in base axes."
-    )
-    if (arm := report.stiffness.posture.arm).slides.any():
-        console.print(f"Sliding joints count with the arm's length, {arm.length:.4g} m, as lever.")
-    return console
+    console.print(report.model)
+    return "\n".join(map(str.rstrip, console.export_text().splitlines()))
 
 
-def _tables(report: Report) -> Iterator[tuple[tuple[str, ...], ...]]:
+def tables(report: Report) -> Iterator[tuple[tuple[str, ...], ...]]:
     """Yield the rows of each table; the first has the titles of its columns."""
     rows = []
     for comparison in report.comparisons:

@@ -38,7 +38,7 @@ COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
         ("stiffness PROBE --load 1,2,nan", 1, "--load: "),
         ("stiffness PROBE --mass 1 --set gravity=[0,0,0]", 2, "has no weight without gravity"),
         ("stiffness PROBE --minimum 50 --maximum 20", 1, "maximum: 20 N"),
-        ("stiffness PROBE --out report.txt", 2, "does not end in .html"),
+        ("stiffness PROBE --out report.pdf", 2, "does not end in .html or .txt"),
         ("stiffness absent.toml", 1, "does not exist"),
         ("stiffness sweep.nc", 1, "is a sweep or a table, no arm"),
         ("weigh PROBE", 2, "give it or --mass"),
