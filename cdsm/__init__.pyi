@@ -55,6 +55,7 @@ from cdsm.interchange.caspr import read_caspr as read_caspr
 from cdsm.interchange.mjcf import to_mjcf as to_mjcf
 from cdsm.kinematics import inverse_kinematics as inverse_kinematics
 from cdsm.kinematics import solve_joint_angles as solve_joint_angles
+from cdsm.loads import Load as Load
 from cdsm.manipulator import Manipulator as Manipulator
 from cdsm.measures.clearance import clearance as clearance
 from cdsm.measures.indices import isotropy as isotropy

@@ -15,7 +15,7 @@ from cdsm.routing import Indices
 from cdsm.stiffness_matrix import FrictionState, Stiffness, assemble
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
-from cdsm.terms import total
+from cdsm.terms import Applied, total
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wrapped_segments import STRAIGHT
 
@@ -197,7 +197,7 @@ def assemble_segments(
     pose: Posture,
     tension: Array,
     sliding: Flags,
-    wrench: Array,
+    wrench: Applied,
     friction: FrictionState,
     distribution: Tension | None = None,
 ) -> Stiffness:

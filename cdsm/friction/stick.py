@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from cdsm.friction.capstan import ChainProblem, assemble_segments, can_stick
+from cdsm.loads import LoadsLike, link_point
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, checked_tension, stiffness
 from cdsm.stiffness_matrix.verdict import describe_buckling
@@ -22,6 +23,7 @@ from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import SMALLEST, Direction, unit_direction
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
+from cdsm.terms import LinkPoint, Loads, PointLoad, combined
 
 _NEVER: Final = 1e-12  # a hole never slides if its |x_i| − y_i is below this part of all |x_i|
 _STUCK: Final = 1e9  # ratio of tensions that no hole reaches
@@ -63,7 +65,7 @@ class Breakaway(Result):
 
 
 def stuck_stiffness(
-    pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
+    pose: Posture, tension: Tension | ArrayLike, wrench: LoadsLike | None = None
 ) -> Stiffness:
     """Compute the stiffness while all cables stick: weights below :func:`breakaway` measure it.
 
@@ -86,7 +88,9 @@ def breakaway(
     pose: Posture,
     tension: Tension | ArrayLike,
     direction: Direction,
-    wrench: ArrayLike | None = None,
+    wrench: LoadsLike | None = None,
+    link: str | None = None,
+    point: ArrayLike | None = None,
 ) -> Breakaway:
     """Compute the force along a direction at which the first cable begins to slide in a hole.
 
@@ -102,7 +106,10 @@ def breakaway(
         pose: The posture.
         tension: F (C,) [N], as for :func:`~cdsm.stiffness`; a residual torque is kept as a load.
         direction: u (3,) of the force in base axes, any length, or an axis such as ``"-z"``.
-        wrench: W (6,) at ``tool0`` before the force acts; only with your own tensions.
+        wrench: W (6,) at ``tool0`` before the force acts, or loads on links; only with your own
+            tensions.
+        link: Link on which the force acts; None: at the tip.
+        point: Where on it, as for :class:`~cdsm.Load`.
 
     Raises:
         InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is not a direction.
@@ -110,14 +117,16 @@ def breakaway(
         SingularStiffness: The stuck arm is about to buckle.
     """
     u = unit_direction("direction", direction)
+    at = None if link is None else link_point(pose.arm, link, point)
     K = stuck_stiffness(pose, tension, wrench)
+    J_v = (pose.jacobian if at is None else at.jacobian(pose))[:3]
     segments = pose.segments
     chains = segments.chains
     loads = np.full(segments.wrap.size, math.inf)
     sticks = can_stick(pose)
-    if math.isfinite(K.along(u)):
+    if math.isfinite(K.tip_response(u, J_v=J_v)[0]):
         assert K.tension_gradient is not None
-        motion = np.asarray(np.linalg.solve(K.joint, u @ pose.jacobian[:3]), np.float64)
+        motion = np.asarray(np.linalg.solve(K.joint, u @ J_v), np.float64)
         F = K.tension[chains.cable]
         slack = K.tension[chains.cable] == 0.0
         relative = K.tension_gradient @ motion / np.where(slack, 1.0, F)
@@ -132,7 +141,7 @@ def breakaway(
     site = 0
     link = ""
     if 0.0 < load < math.inf:
-        load, hole = _first_slip(K, u, load, motion)
+        load, hole = _first_slip(K, u, load, motion, at)
         first = pose.arm.cables[chains.cable[chains.hole[hole]]]
         site = int(chains.site[hole]) + 1
         cable = first.name
@@ -141,7 +150,9 @@ def breakaway(
     return Breakaway(stiffness=K, direction=u, load=load, hole_loads=frozen(loads), **where)
 
 
-def _first_slip(K: Stiffness, u: Array, load: float, motion: Array) -> tuple[float, int]:
+def _first_slip(
+    K: Stiffness, u: Array, load: float, motion: Array, point: LinkPoint | None
+) -> tuple[float, int]:
     """Return load [N] and hole of first slip along u; ``load``, ``motion`` [rad/N]: first order."""
     pose = K.posture
     arm = K.posture.arm
@@ -165,10 +176,13 @@ def _first_slip(K: Stiffness, u: Array, load: float, motion: Array) -> tuple[flo
         return np.where(can_stick(pose), abs(rise) - moved.segments.grip, -np.inf)
 
     half, T = at(load / 2.0, motion)
-    wrench = K.wrench + load / 2.0 * np.append(u, np.zeros(3))
+    force = load / 2.0 * np.append(u, np.zeros(3))
+    added = force if point is None else Loads((PointLoad(point, force),))
+    wrench = combined(K.applied, added)
     none = np.zeros(chains.hole.size, dtype=np.bool_)
+    J_half = (half.jacobian if point is None else point.jacobian(half))[:3]
     there = assemble_segments(half, T, none, wrench, "stuck")
-    motion = np.asarray(np.linalg.solve(there.joint, u @ half.jacobian[:3]), np.float64)
+    motion = np.asarray(np.linalg.solve(there.joint, u @ J_half), np.float64)
     if excess(2.0 * load).max() > 0.0:
         load = float(brentq(lambda load: excess(load).max(), 0.0, 2.0 * load, rtol=1e-6))
     return load, int(excess(load).argmax())
@@ -235,7 +249,7 @@ def rest_band(
     pose: Posture,
     tension: Tension | ArrayLike,
     direction: Direction,
-    wrench: ArrayLike | None = None,
+    wrench: LoadsLike | None = None,
 ) -> RestBand:
     """Compute how far along a direction the tip may rest, whatever loads came before.
 

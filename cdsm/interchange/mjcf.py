@@ -37,6 +37,7 @@ from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.validation import RANGES, instance, one_of, scalar
 from cdsm.support.values import Array
 from cdsm.tension import Tension
+from cdsm.terms import texts
 
 Actuators = Literal["length", "tension", "none"]
 
@@ -240,8 +241,9 @@ def _motion(
 
 def _missing(K: Stiffness) -> Iterator[str]:
     """Yield a remark if K has a wrench, which the model lacks, and one if K is out of balance."""
-    if K.wrench.any():
-        load = f"{coordinates(K.wrench[:3])} N, {coordinates(K.wrench[3:])} N m"
+    yield from (f"load       {text}: not in the model, apply it there" for text in texts(K.applied))
+    if (W := K.tip_wrench).any():
+        load = f"{coordinates(W[:3])} N, {coordinates(W[3:])} N m"
         yield f"load       {load} is not in the model: apply it to {K.posture.arm.tip_link}"
     left, joint, part = balance_error(K)
     if part > TOLERANCE:
@@ -252,7 +254,7 @@ def _as_force_controlled(K: Stiffness) -> Stiffness:
     """Return K with the passive part removed, as if all motors controlled force."""
     arm = K.posture.arm
     free = arm.with_cables([replace(cable, control="force") for cable in arm.cables])
-    return stiffness(free.at(K.posture.q, check_limits=False), K.tension, wrench=K.wrench)
+    return stiffness(free.at(K.posture.q, check_limits=False), K.tension, wrench=K.applied)
 
 
 def _cables(

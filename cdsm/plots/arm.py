@@ -187,7 +187,7 @@ def _scene(
         near = 0.0 < rest.moved < _FAR * pose.arm.length
         before = rest.reference if near else None
         tension = rest.tension if tension is None else tension
-        load = rest.wrench[:3]
+        load = rest.tip_wrench[:3]
         warnings = rest.warnings
         compliance = rest.compliance if rest.stable and stiffness is None else None
     instance("pose", pose, Posture)
@@ -199,7 +199,7 @@ def _scene(
         if not K.posture.equals(pose):
             problem = "belongs to another posture or arm; compute it for this one."
             raise InvalidInput("stiffness", problem)
-        load = K.wrench[:3]
+        load = K.tip_wrench[:3]
         warnings = (*warnings, *K.warnings)
         compliance = K.compliance if K.is_stable else None
     if isinstance(tension, Tension) and tension.posture.arm != pose.arm:

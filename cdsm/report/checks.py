@@ -22,7 +22,7 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.stiffness_matrix.report import Comparison, Verdict
 from cdsm.stiffness_matrix.verdict import TOLERANCE, imbalance_of
 from cdsm.support.values import Array
-from cdsm.terms import ConstantPull, Stretch, torque_size, without_cables
+from cdsm.terms import ConstantPull, Stretch, as_loads, torque_size, without_cables
 
 _SMALL = 1e-3  # a term below this fraction of the whole is compared to this fraction of it
 _SAME = 1e-10  # K and the batch agree to this fraction of the largest entry of K_θ
@@ -33,7 +33,7 @@ _CHANGE = 4e-3  # largest change of a tension in a step, as a fraction of the te
 
 def balance_error(K: Stiffness) -> tuple[float, str, float]:
     """Return the largest residual of Eq. 13 [N m], its joint, and the residual per torque [-]."""
-    joint, torque, relative = imbalance_of(K.posture, K.tension, K.wrench, K.residual)
+    joint, torque, relative = imbalance_of(K.posture, K.tension, K.applied, K.residual)
     return torque, K.posture.arm.joint_names[joint], relative
 
 
@@ -117,7 +117,7 @@ def _terms(K: Stiffness) -> tuple[Term, ...]:
     """Return the terms of the energy, with K's posture as their reference, in the order of K."""
     pose = K.posture
     stretch = Stretch(K.tension, K.cable_stiffness, K.free_lengths, pose.cable_lengths)
-    return ConstantPull(K.tension), stretch, *without_cables(pose, K.wrench, pose)
+    return ConstantPull(K.tension), stretch, *without_cables(pose, K.applied, pose)
 
 
 def _compare(
@@ -137,6 +137,9 @@ def _batch_comparison(K: Stiffness, names: list[str], matrices: Array, most: flo
     """Compare the terms of K and K_θ (n, nv, nv) with those of :func:`cdsm.evaluate`."""
     arm = K.posture.arm
     unit = K.posture.arm.levers
+    if elsewhere := as_loads(K.applied).on_links:
+        links = listed([load.at.link for load in elsewhere])
+        return _compare("batch", matrices, matrices, 0.0, most, f"no kernel for loads on {links}")
     if lacking := without_kernel(arm):
         return _compare("batch", matrices, matrices, 0.0, most, f"no kernel for {listed(lacking)}")
     slack = (K.tension == 0.0) & (K.cable_stiffness == 0.0)

@@ -41,9 +41,9 @@ def find_remedies(K: Stiffness) -> Iterator[Remedy]:
             for cable in cables
         ]
         there = pose.arm.with_cables(changed).at(pose.q, check_limits=False)
-        return stiffness(there, K.tension, K.wrench).margin
+        return stiffness(there, K.tension, K.applied).margin
 
-    if stiffness(pose, K.tension, K.wrench).margin > 0.0:
+    if stiffness(pose, K.tension, K.applied).margin > 0.0:
         return
     if pose.arm.laws.held:
         yield Remedy("wire", _factor(stiffer, _STIFFER))
@@ -56,7 +56,7 @@ def find_remedies(K: Stiffness) -> Iterator[Remedy]:
 
         def tension(s: float) -> float:
             least = np.where(low < high, s * low, low)
-            return stiffness(pose, distribute_tension(pose, least, high, K.wrench, solver)).margin
+            return stiffness(pose, distribute_tension(pose, least, high, K.applied, solver)).margin
 
         yield Remedy("tension", _factor(tension, _MORE_OR_LESS))
 

@@ -14,6 +14,7 @@ from cdsm.report.remedies import find_remedies
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Report, Stiffness
 from cdsm.stiffness_matrix.verdict import TOLERANCE, describe_buckling
+from cdsm.terms import as_loads
 
 
 def report_on(K: Stiffness) -> Report:
@@ -84,7 +85,7 @@ def _notes(report: Report) -> Iterator[str]:
         yield f"the cables have friction; this K is frictionless, as after shaking. {_stuck(K)}"
     if reason := next(check.reason for check in report.comparisons if check.name == "batch"):
         yield f"not compared with cdsm.evaluate: {reason}."
-    if K.wrench[3:].any():
+    if any(load.wrench[3:].any() for load in as_loads(K.applied).loads):
         yield "with a moment at the tip K_θ is not symmetric: its symmetric part decides stability."
     yield from _of_limits(K)
     unit = K.posture.arm.levers
@@ -131,7 +132,7 @@ def _of_limits(K: Stiffness) -> Iterator[str]:
 def _stuck(K: Stiffness) -> str:
     """Return below which load friction holds all cables, and the stiffness there."""
     try:
-        thresholds = [(axis, breakaway(K.posture, K.tension, axis, K.wrench)) for axis in "xyz"]
+        thresholds = [(axis, breakaway(K.posture, K.tension, axis, K.applied)) for axis in "xyz"]
         stuck = ", ".join(
             f"{threshold.stiffness.along(u) / 1e3:.4g}" for u, threshold in thresholds
         )

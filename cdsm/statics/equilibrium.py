@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import InvalidInput, SingularStiffness, listed
+from cdsm.loads import LoadsLike, loads_of
 from cdsm.posture import Posture
 from cdsm.statics.events import Event, events_text
 from cdsm.statics.locked_arm import LockedArm
@@ -32,9 +33,10 @@ from cdsm.stiffness_matrix.verdict import (
 )
 from cdsm.support.format import aligned, coordinates, merged, prepare_json, without_rounding
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import Direction, instance, unit_direction, wrench_vector
+from cdsm.support.validation import Direction, instance, unit_direction
 from cdsm.support.values import Array, draw, frozen
 from cdsm.tension import Tension
+from cdsm.terms import Applied, texts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,10 +105,20 @@ class Equilibrium(Result):
         """Tensions F (C,) [N] at the equilibrium."""
         return self.stiffness.tension
 
-    @quantity("N and N m", "component")
+    @property
+    def applied(self) -> Applied:
+        """What acts: W (6,) at the tip, or loads on links."""
+        return self.stiffness.applied
+
+    @property
     def wrench(self) -> Array:
-        """W (6,) at ``tool0`` in base axes: force [N], then moment [N m]."""
+        """W (6,) at ``tool0``, base axes; InvalidInput if loads act on other links."""
         return self.stiffness.wrench
+
+    @quantity("N and N m", "component", name="wrench")
+    def tip_wrench(self) -> Array:
+        """W (6,) of what acts at ``tool0``, base axes: force [N], then moment [N m]."""
+        return self.stiffness.tip_wrench
 
     @quantity("torque", "joint")
     def residual(self) -> Array:
@@ -195,7 +207,7 @@ class Equilibrium(Result):
             yield Finding(Status.NEUTRAL, sentence)
         yield from find_stops(arm, self.at_limit)
         yield from find_doubts(self.pose)
-        imbalance = imbalance_of(self.pose, self.tension, self.wrench, self.residual)
+        imbalance = imbalance_of(self.pose, self.tension, self.applied, self.residual)
         yield from find_imbalance(arm, imbalance, self.residual)
         yield from find_excess(arm, self.tension)
         yield from find_slack(self.slack)
@@ -269,7 +281,11 @@ class Equilibrium(Result):
         Raises:
             SingularStiffness: K_θ of these joints is singular.
         """
-        J = self.pose.jacobian[:, self._free]
+        return self.compliance_of(None)
+
+    def compliance_of(self, jacobian: Array | None) -> Array:
+        """Compute :attr:`compliance` of another point, from its motion (6, nv) by the joints."""
+        J = (self.pose.jacobian if jacobian is None else jacobian)[:, self._free]
         return frozen(J @ self.stiffness.joint_compliance(self._free) @ J.T)
 
     def report(self) -> Report:
@@ -287,20 +303,24 @@ class Equilibrium(Result):
             problem = "does not know of stops, and"
             raise InvalidInput("report", f"{problem} {listed(self.at_limit)} rests on its own.")
         pose = self.held_posture(self.stiffness.cable_stiffness == 0.0)
-        return stiffness(pose, self.tension, self.wrench).report()
+        return stiffness(pose, self.tension, self.applied).report()
 
-    def along(self, direction: Direction) -> float:
+    def along(
+        self, direction: Direction, link: str | None = None, point: ArrayLike | None = None
+    ) -> float:
         """Compute the tip stiffness 1/(uᵀ C_vv u) [N/m] along u, with joints at stops fixed.
 
         C_vv (3, 3) is the part of :attr:`compliance` that relates displacements to forces. u is an
         axis such as ``"z"``, or (3,) in base axes, any length. The stiffness is inf if the tip
-        cannot move along u.
+        cannot move along u. ``link`` and ``point`` are as in :meth:`Stiffness.along`.
 
         Raises:
             InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero.
             SingularStiffness: K_θ of the joints that are not at stops is singular.
         """
-        return self.stiffness.tip_response(unit_direction("direction", direction), self._free)[0]
+        u = unit_direction("direction", direction)
+        J_v = None if link is None else self.stiffness.jacobian_at(link, point)[:3]
+        return self.stiffness.tip_response(u, self._free, J_v)[0]
 
     def _along_axes(self) -> str:
         """Return the stiffness along x, y, z [N/mm] as text; of a locked direction no number."""
@@ -339,7 +359,7 @@ class Equilibrium(Result):
             rows.append((cable.name, f"{F:.3f}", f"{F0:.3f}", state))
         moved = coordinates(without_rounding(1000.0 * self.displacement))
         lines = [*aligned(rows), f"tip moved by {moved} mm", *events_text(self.events)]
-        lines += [self.history] if self.history else []
+        lines += [*texts(self.applied), *([self.history] if self.history else [])]
         stopped = np.flatnonzero(self.stop_torque).tolist()
         if len(stopped) <= MOST_JOINTS:
             lines += [
@@ -363,7 +383,7 @@ class Equilibrium(Result):
 
 
 def equilibrium(
-    pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
+    pose: Posture, tension: Tension | ArrayLike, wrench: LoadsLike | None = None
 ) -> Equilibrium:
     """Compute the equilibrium of an arm under a dead wrench, its motors locked at a reference.
 
@@ -381,7 +401,7 @@ def equilibrium(
         tension: F at the reference: the result of :func:`~cdsm.distribute_tension`, or other
             tensions (C,) [N], which need not balance the arm.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]. Default: the wrench
-            of the ``Tension``, or zero.
+            of the ``Tension``, or zero. Or loads on any links, as for :func:`~cdsm.stiffness`.
 
     Raises:
         InvalidInput: As for :func:`~cdsm.stiffness`. The posture is beyond a joint limit.
@@ -391,7 +411,7 @@ def equilibrium(
             the error names this cable.
     """
     K = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
-    W = K.wrench if wrench is None else wrench_vector("wrench", wrench)
+    W = K.applied if wrench is None else loads_of(pose.arm, wrench)
     pose.arm.checked_angles(pose.q)  # within the joint limits
     arm = LockedArm(pose, K.tension, W)
     return as_equilibrium(arm, settled(arm, pose))

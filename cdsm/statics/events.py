@@ -28,7 +28,8 @@ from cdsm.statics.continuation import (
 )
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import Point
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array
+from cdsm.terms import combined, scaled
 
 Kind = Literal["slack", "stop", "maximum", "law", "buckling"]
 
@@ -176,7 +177,7 @@ def events_under(arm: LockedArm, load: Array, maximum: Array) -> tuple[Event, ..
     """
 
     def model(share: float) -> LockedArm:
-        return arm.under(frozen(arm.wrench + share * load))
+        return arm.under(combined(arm.wrench, scaled(load, share)))
 
     start = stage_at(model, arm.reference, np.zeros(arm.reference.q.size), 0.0)
     branch = follow(model, start, 1.0)

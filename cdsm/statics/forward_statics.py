@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import EquilibriumError, InvalidInput
+from cdsm.loads import LoadsLike, loads_of
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.continuation import Model, follow, stage_at
@@ -27,9 +28,9 @@ from cdsm.support.validation import (
     one_of,
     scalar,
     vector,
-    wrench_vector,
 )
 from cdsm.support.values import Array, frozen
+from cdsm.terms import Applied, acts, as_loads, scaled
 
 _HELD = 1e-9  # least stiffness of a joint without load, over the largest
 _FIRST = 1e-3  # share of the pull at which a path with friction begins: at 0 N no cable slides
@@ -47,7 +48,7 @@ def forward_statics(
     tension: OfCables | None = None,
     rest_lengths: OfCables | None = None,
     pull: OfCables | None = None,
-    wrench: ArrayLike = NO_WRENCH,
+    wrench: LoadsLike = NO_WRENCH,
     start: ArrayLike | None = None,
     friction: bool = True,
 ) -> Equilibrium:
@@ -73,7 +74,8 @@ def forward_statics(
             the cables are just straight at the angles q_0 of the springs: these lengths become
             shorter by ``gain`` · pull − ``slack`` of each :class:`~cdsm.Cable`. A cable is straight
             at zero strain, where a law that begins above 0 N has its lowest tension.
-        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; or loads on any
+            links, as for :func:`~cdsm.stiffness`.
         start: Angles q (nv,) [rad] at which the search begins, under the whole load. None: load and
             pull grow from nothing, from the angles q_0; :attr:`Equilibrium.branch` says if the arm
             jumped on the way. A start has no history: not with friction.
@@ -101,7 +103,7 @@ def forward_statics(
             "has no history, on which it depends where an arm with friction rests. Leave it out, "
             "follow the loads by load_cycle, or give friction=False.",
         )
-    W = wrench_vector("wrench", wrench)
+    W = loads_of(arm, wrench)
     home = arm.at(home_angles(arm))
     begin = home if start is None else arm.at(start)
     model = _model(arm, named[0], _of_all(arm, named[0], commands[named[0]]), home, begin, W)
@@ -113,7 +115,7 @@ def forward_statics(
         return _with_friction(model, home, W)
     here = settled(model(0.0), home)
     branch = follow(model, stage_at(model, here.state.pose, here.stop_torque, 0.0), 1.0)
-    force = float(np.linalg.norm(W[:3]))
+    force = sum(float(np.linalg.norm(load.wrench[:3])) for load in as_loads(W).loads)
     events = events_on(model, branch, watched(model(0.0)), force, 1.0)
     last = branch[-1]
     reached = 1.0
@@ -124,8 +126,8 @@ def forward_statics(
     return as_equilibrium(loaded, here, reached, events)
 
 
-def _with_friction(model: Model, home: Posture, wrench: Array) -> Equilibrium:
-    """Follow an arm with friction: its motors pull, then the ``wrench`` (6,) is hung on."""
+def _with_friction(model: Model, home: Posture, wrench: Applied) -> Equilibrium:
+    """Follow an arm with friction: its motors pull, then the ``wrench`` is hung on."""
 
     def pulled(share: float) -> LockedArm:
         return model(share).under(none)
@@ -146,7 +148,7 @@ def _with_friction(model: Model, home: Posture, wrench: Array) -> Equilibrium:
         straight = pose.arm.laws.original_lengths(pose.cable_lengths, F)
         more = np.where(F == 0.0, np.maximum(wire - straight, 0.0), 0.0)
     goals = [Goal(none, taken, _PULL_STEPS, "the pull")]
-    goals += [Goal(wrench, taken, _LOAD_STEPS, "the load")] if wrench.any() else []
+    goals += [Goal(wrench, taken, _LOAD_STEPS, "the load")] if acts(wrench) else []
     arm = QuasiStaticArm(pose, F)
     path, _ = approach(arm, arm.initial(none, more), goals)
     rest = home.arm.at(path.angles[-1], check_limits=False)
@@ -154,7 +156,7 @@ def _with_friction(model: Model, home: Posture, wrench: Array) -> Equilibrium:
     k = frozen(np.where(K.tension > 0.0, K.cable_stiffness, 0.0))
     wires = rest.cable_lengths if loaded.rest_length is None else loaded.rest_length
     slides = np.count_nonzero(path.sliding[-1])
-    then = ", then loaded" if wrench.any() else ""
+    then = ", then loaded" if acts(wrench) else ""
     history = f"with friction: pulled from slack in {_PULL_STEPS} steps{then}; {slides} of "
     history += f"{plural(len(path.holes), 'hole')} slide; another history ends elsewhere"
     return Equilibrium(
@@ -203,12 +205,12 @@ def _of_all(arm: Manipulator, name: str, value: Any) -> ArrayLike:
 
 
 def _model(
-    arm: Manipulator, name: str, value: ArrayLike, home: Posture, begin: Posture, wrench: Array
+    arm: Manipulator, name: str, value: ArrayLike, home: Posture, begin: Posture, wrench: Applied
 ) -> Model:
     count = len(arm.cables)
     if name == "tension":
-        F, _ = checked_tension(home, value, wrench)
-        return lambda share: LockedArm(begin, share * F, share * wrench, tension_held=True)
+        F, _ = checked_tension(home, value, None)
+        return lambda share: LockedArm(begin, share * F, scaled(wrench, share), tension_held=True)
     for cable in arm.cables:
         if cable.control == "force":
             problem = f"{cable.name} has control='force': its motor holds a tension, no length. "
@@ -230,7 +232,7 @@ def _model(
 
     def model(share: float) -> LockedArm:
         lengths = straight + share * (rest - straight)
-        return LockedArm(begin, least, share * wrench, lengths)
+        return LockedArm(begin, least, scaled(wrench, share), lengths)
 
     return model
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import InvalidInput
 from cdsm.friction.capstan import assemble_segments
+from cdsm.loads import loads_of
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
@@ -32,6 +33,9 @@ from cdsm.support.result import AXIS_NAMES, Result, data_frame, quantity, unit
 from cdsm.support.validation import WRENCH, instance, number_array, whole_number
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
+from cdsm.terms import Applied, Loads, tip_part
+
+WrenchesLike = ArrayLike | Mapping[str, ArrayLike] | Sequence[Applied]
 
 _SHOWN = 24  # largest number of loads that are printed; of more, the first and the last ones
 
@@ -52,7 +56,8 @@ class LoadHistory(Result, Plotted):
             cycle goes on from a rest with friction, F at the motors.
         reference_wrench: W at the reference (6,): force [N], then moment [N m].
         load: Number of each load (n,), from 0: its row in ``wrenches``.
-        wrenches: W at each load (n, 6): force [N], then moment [N m].
+        wrenches: W of what acts at the tip at each load (n, 6): force [N], then moment [N m].
+        applied: What acts at each load (n): W (6,) at the tip, or loads on links.
         motors: Commands at each load (n, C): rest length [m] that a position-controlled motor has
             taken in since the reference, or the tension [N] of a force-controlled one.
         angles: Joint coordinates at each load (n, nv) [rad].
@@ -77,6 +82,7 @@ class LoadHistory(Result, Plotted):
     reference_wrench: Array = field(metadata=unit("N and N m", "component"))
     load: NDArray[np.int_] = field(metadata=unit("1", "load"))
     wrenches: Array = field(metadata=unit("N and N m", "load", "component"))
+    applied: tuple[Applied, ...]
     motors: Array = field(metadata=unit("m or N", "load", "cable"))
     angles: Array = field(metadata=unit("joint", "load", "joint"))
     tip: Array = field(metadata=unit("m", "load", "axis"))
@@ -147,9 +153,8 @@ class LoadHistory(Result, Plotted):
         k = self._index(load)
         sliding = self.sliding[k] != 0
         T = self.segment_tensions[k].copy()
-        W = frozen(self.wrenches[k].copy())
         friction: FrictionState = "sliding" if sliding.any() else "stuck"
-        return assemble_segments(self.pose(k), T, sliding, W, friction)
+        return assemble_segments(self.pose(k), T, sliding, self.applied[k], friction)
 
     def write_loop(self, path: str | os.PathLike[str]) -> Path:
         """Write force, displacement, number of sliding holes and lost work as CSV; return the path.
@@ -196,7 +201,7 @@ class LoadHistory(Result, Plotted):
 def load_cycle(
     pose: Posture,
     tension: Tension | Equilibrium | ArrayLike,
-    wrenches: ArrayLike,
+    wrenches: WrenchesLike,
     *,
     motors: ArrayLike | None = None,
     substeps: int = 4,
@@ -222,7 +227,8 @@ def load_cycle(
             load. Or an :class:`Equilibrium` with this posture, as of :func:`~cdsm.forward_statics`:
             its motors go on holding the tensions, or the lengths, of slack cables too; if it has a
             ``path``, the segments begin with the tensions that friction left them.
-        wrenches: W of each load (n, 6) at ``tool0`` in base axes: force [N], then moment [N m].
+        wrenches: W of each load (n, 6) at ``tool0`` in base axes: force [N], then moment [N m]; or
+            a dict of them by links.
             Before the first load the wrench is that of the ``Tension``, or zero.
         motors: Commands of the motors at each load (n, C): for a position-controlled cable the rest
             length (at zero strain) of wire taken in since the reference [m], positive if the motor
@@ -246,7 +252,7 @@ def load_cycle(
 def follow_loads(
     pose: Posture,
     tension: Tension | Equilibrium | ArrayLike,
-    wrenches: ArrayLike,
+    wrenches: WrenchesLike,
     *,
     motors: ArrayLike | None = None,
     substeps: int = 4,
@@ -263,18 +269,13 @@ def follow_loads(
         rest = tension.resumed(pose, None)
         pose = rest.held_posture(rest.force_controlled)
         F = rest.tension
-        W = rest.wrench
+        W = rest.applied
         slack = rest.paid_out
         T = rest.stiffness.segment_tension
     else:
         F, W = checked_tension(pose, tension, None)
     pose.arm.laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
-    loads = number_array("wrenches", wrenches, "wrench")
-    if loads.ndim != 2 or loads.shape[1] != 6 or not len(loads):
-        raise InvalidInput(
-            "wrenches",
-            f"shape {loads.shape} given, (n, 6) needed, n > 0: one wrench per load ({WRENCH}).",
-        )
+    loads = _loads(pose.arm, wrenches)
     substeps = whole_number("substeps", substeps, 1, 1000)
     arm = QuasiStaticArm(pose, F)
     state = arm.initial(W, slack, T)
@@ -289,10 +290,37 @@ def follow_loads(
     return approach(arm, state, goals, near)
 
 
+def _loads(arm: Manipulator, wrenches: WrenchesLike) -> Sequence[Applied]:
+    """Return what acts at each load; InvalidInput if it is not (n, 6), or (n, 6) by links."""
+    if isinstance(wrenches, (list, tuple)) and any(isinstance(load, Loads) for load in wrenches):
+        return [loads_of(arm, load) for load in wrenches]
+    if not isinstance(wrenches, Mapping):
+        return list(_rows("wrenches", wrenches))  # type: ignore[arg-type]
+    rows = {link: _rows(f"wrenches[{link!r}]", W) for link, W in wrenches.items()}
+    counts = {len(W) for W in rows.values()}
+    if len(counts) != 1:
+        raise InvalidInput("wrenches", "give (n, 6) for each link, n loads for all of them.")
+    return [
+        loads_of(arm, {link: W[k] for link, W in rows.items()}, "wrenches")
+        for k in range(counts.pop())
+    ]
+
+
+def _rows(name: str, wrenches: ArrayLike) -> Array:
+    """Return wrenches (n, 6), checked."""
+    rows = number_array(name, wrenches, "wrench")
+    if rows.ndim != 2 or rows.shape[1] != 6 or not len(rows):
+        raise InvalidInput(
+            name,
+            f"shape {rows.shape} given, (n, 6) needed, n > 0: one wrench per load ({WRENCH}).",
+        )
+    return rows
+
+
 class Goal(NamedTuple):
     """A load, and how it is approached."""
 
-    wrench: Array  # W (6,): force [N], then moment [N m]
+    wrench: Applied  # W (6,): force [N], then moment [N m]; or loads on links
     motors: Array  # commands (C,), as those of a LoadHistory
     substeps: int  # number of equal steps on the way
     what: str  # name of the way, in errors
@@ -326,9 +354,10 @@ def approach(
     history = LoadHistory(
         reference=pose,
         reference_tension=arm.tension,
-        reference_wrench=start.load.wrench,
+        reference_wrench=tip_part(start.load.wrench),
         load=frozen(np.arange(len(goals))),
-        wrenches=frozen(np.array([goal.wrench for goal in goals])),
+        wrenches=frozen(np.array([tip_part(goal.wrench) for goal in goals])),
+        applied=tuple(goal.wrench for goal in goals),
         motors=frozen(np.array([goal.motors for goal in goals])),
         angles=frozen(np.array([arm_state.pose.q for arm_state in arms])),
         tip=frozen(np.array([arm_state.pose.tip[:3, 3] for arm_state in arms])),

@@ -15,6 +15,7 @@ from cdsm.statics.solve import ArmState
 from cdsm.stiffness_matrix import Stiffness, assemble
 from cdsm.support.values import Array, frozen
 from cdsm.terms import (
+    Applied,
     ConstantPull,
     Stretch,
     stiffness_of,
@@ -44,7 +45,7 @@ class LockedArm:
         self,
         reference: Posture,
         tension: Array,
-        wrench: Array,
+        wrench: Applied,
         rest_length: Array | None = None,
         *,
         tension_held: bool = False,
@@ -73,7 +74,7 @@ class LockedArm:
             locked = _LockedLaw(law, cables, wire, series, F, law.strain(F), length[cables])
             self._laws.append(locked)
 
-    def under(self, wrench: Array) -> LockedArm:
+    def under(self, wrench: Applied) -> LockedArm:
         """Return the arm under another wrench (6,), its motors as they are."""
         other = copy(self)
         other.wrench = wrench

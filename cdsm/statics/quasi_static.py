@@ -20,7 +20,14 @@ from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm, require_domain
 from cdsm.statics.solve import ArmState, Balance, Point, continued, settle
 from cdsm.support.values import Array, frozen
-from cdsm.terms import stiffness_of, torque_of, torque_size_of, without_cables
+from cdsm.terms import (
+    Applied,
+    between,
+    stiffness_of,
+    torque_of,
+    torque_size_of,
+    without_cables,
+)
 
 EquilibriumPath = Mapping[float, Array]
 """Equilibria x (nv,) on the way to a load, as normal maps solve them, by the part of the way."""
@@ -32,13 +39,15 @@ _SHORTEST = 2.0**-8  # shortest sub-step, as a part of the step between two load
 class Load(NamedTuple):
     """Load and motor commands that act on an arm."""
 
-    wrench: Array  # W (6,): force [N], then moment [N m]
+    wrench: Applied  # W (6,): force [N], then moment [N m]; or loads on links
     holding: Array  # torque that holds an unbalanced arm at its reference (nv,) [N m]
     motors: Array  # per cable (C,): rest length taken in [m]; or tension [N] of a force motor
 
     def interpolate(self, other: Load, part: float) -> Load:
         """Return the load at the part ``part`` (0 to 1) of the straight way to ``other``."""
-        return Load(*(a + part * (b - a) for a, b in zip(self, other, strict=True)))
+        holding = self.holding + part * (other.holding - self.holding)
+        motors = self.motors + part * (other.motors - self.motors)
+        return Load(between(self.wrench, other.wrench, part), holding, motors)
 
 
 @dataclass(frozen=True)
@@ -85,7 +94,7 @@ class QuasiStaticArm:
         self._problem = ChainProblem(arm.cables, self.start)
 
     def initial(
-        self, wrench: Array, slack: Array | float = 0.0, tension: Array | None = None
+        self, wrench: Applied, slack: Array | float = 0.0, tension: Array | None = None
     ) -> QuasiStaticState:
         """Return the state at the reference under ``wrench`` (6,).
 

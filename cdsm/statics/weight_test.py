@@ -12,18 +12,21 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
+from cdsm.loads import LoadsLike, link_point
 from cdsm.posture import Posture
 from cdsm.statics.continuation import Model, Stage, equilibrium_near, follow, stage_at
 from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, equilibrium
 from cdsm.statics.events import Event, Watched, events_on, events_text, mass_of, watched
-from cdsm.statics.load_cycle import LoadHistory, load_cycle
+from cdsm.statics.load_cycle import LoadHistory, follow_loads
 from cdsm.statics.locked_arm import LockedArm
+from cdsm.stiffness_matrix import Stiffness
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import coordinates, plural, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import unit_direction, vector, whole_number
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
+from cdsm.terms import Applied, LinkPoint, Loads, PointLoad, combined, scaled
 
 SLIDING = 1.25  # an arm slides if its tangent is at most so many times the frictionless one
 
@@ -51,6 +54,7 @@ class WeightTest(Result, Plotted):
             go slack, stops, maxima, ends of laws. Empty with friction, where ``breakaway``,
             :attr:`sliding_load` and ``history.sliding`` say when cables slide.
         event_displacements: Displacement of the tip at each event (m, 3) [m], as ``displacements``.
+        point: Where the weight hangs and the displacement is read; None: the tip.
     """
 
     _headline = "stiffness"
@@ -66,6 +70,7 @@ class WeightTest(Result, Plotted):
     event_displacements: Array = field(
         default_factory=lambda: frozen(np.empty((0, 3))), metadata=unit("m", "event", "axis")
     )
+    point: LinkPoint | None = None
 
     @property
     def _posture(self) -> Posture:
@@ -79,11 +84,24 @@ class WeightTest(Result, Plotted):
 
     @quantity("m", "loads", "axis")
     def displacements(self) -> Array:
-        """Tip position at each step minus tip position without the weight (n, 3) [m]."""
+        """Position of the tip, or ``point``, at each step minus that unloaded (n, 3) [m]."""
         if self.history is not None:
-            return frozen(self.history.tip[1:] - self.history.tip[0])
-        start = self.unloaded.pose.tip[:3, 3]
-        return frozen(np.array([state.pose.tip[:3, 3] for state in self.states]) - start)
+            if self.point is None:
+                return frozen(self.history.tip[1:] - self.history.tip[0])
+            places = [self._position(self.history.pose(k)) for k in self.history.load.tolist()]
+            return frozen(np.array(places[1:]) - places[0])
+        start = self._position(self.unloaded.pose)
+        return frozen(np.array([self._position(state.pose) for state in self.states]) - start)
+
+    def _position(self, pose: Posture) -> Array:
+        """Return where the weight hangs (3,) [m]."""
+        return _position(pose, self.point)
+
+    def _along(self, stiffness: Stiffness | Equilibrium) -> float:
+        """Return the stiffness [N/m] along the force, where it hangs."""
+        if self.point is None:
+            return stiffness.along(self.force)
+        return stiffness.along(self.force, self.point.link, self.point.local)
 
     @quantity("N", "loads", "cable")
     def tensions(self) -> Array:
@@ -105,7 +123,8 @@ class WeightTest(Result, Plotted):
     @quantity("N/m")
     def frictionless(self) -> float:
         """The same secant [N/m] without friction."""
-        return self._secant(self.states[-1].pose.tip[:3, 3] - self.unloaded.pose.tip[:3, 3])
+        start = self._position(self.unloaded.pose)
+        return self._secant(self._position(self.states[-1].pose) - start)
 
     @quantity("N/m")
     def tangent(self) -> float:
@@ -114,18 +133,19 @@ class WeightTest(Result, Plotted):
         C is :attr:`Equilibrium.compliance` of ``unloaded``: joints at stops are fixed. Raises
         SingularStiffness if the arm without the weight is about to buckle.
         """
-        return self.unloaded.along(self.force)
+        return self._along(self.unloaded)
 
     @quantity("m", "axis")
     def tangent_displacement(self) -> Array:
         """Displacement C_vv ΔF (3,) [m] that the compliance without the weight predicts."""
-        return frozen(self.unloaded.compliance[:3, :3] @ self.force)
+        J = None if self.point is None else self.point.jacobian(self.unloaded.pose)
+        return frozen(self.unloaded.compliance_of(J)[:3, :3] @ self.force)
 
     @quantity("N/m")
     def stuck(self) -> float | None:
         """Stiffness [N/m] along the weight while it is so small that all cables stick, or None."""
         first = self.breakaway
-        return first.stiffness.along(first.direction) if first else None
+        return self._along(first.stiffness) if first else None
 
     @quantity("N")
     def breakaway_load(self) -> float | None:
@@ -143,7 +163,7 @@ class WeightTest(Result, Plotted):
         if self.history is None or self.breakaway_load == 0.0:
             return self.breakaway_load
         slides = [
-            self.history.stiffness(k).along(self.force) <= SLIDING * state.along(self.force)
+            self._along(self.history.stiffness(k)) <= SLIDING * self._along(state)
             for k, state in enumerate(self.states, 1)
         ]
         first = len(slides) - int(np.argmin([*slides[::-1], False]))
@@ -240,7 +260,9 @@ def weight_test(
     force: ArrayLike,
     *,
     steps: int = 1,
-    wrench: ArrayLike | None = None,
+    wrench: LoadsLike | None = None,
+    link: str | None = None,
+    point: ArrayLike | None = None,
 ) -> WeightTest:
     """Compute the stiffness under a weight hung at the tip, with locked motors: 1/C of Eq. 20.
 
@@ -259,7 +281,9 @@ def weight_test(
         force: ΔF (3,) [N] at ``tool0`` in base axes, added to ``wrench``.
         steps: Number of equal load steps, at most 1000.
         wrench: Wrench (6,) without the weight: force [N], then moment [N m]. Default: the wrench of
-            the ``Tension``, or zero.
+            the ``Tension``, or zero. Or loads on links, as for :func:`~cdsm.stiffness`.
+        link: Link on which the weight hangs, and of which the displacement is read; None: the tip.
+        point: Where on it (3,) [m], as for :class:`~cdsm.Load`.
 
     Raises:
         InvalidInput: As for :func:`~cdsm.equilibrium`; or the force is zero or moves the tip by
@@ -283,11 +307,13 @@ def weight_test(
         held = pose
         followed = False
     states = [unloaded]
-    added = np.append(force, np.zeros(3))
-    W = unloaded.wrench
+    at = None if link is None else link_point(pose.arm, link, point)
+    weight = np.append(force, np.zeros(3))
+    added: Applied = weight if at is None else Loads((PointLoad(at, weight),))
+    W = unloaded.applied
 
     def model(share: float) -> LockedArm:
-        return unloaded.model.under(frozen(W + share * added))
+        return unloaded.model.under(combined(W, scaled(added, share)))
 
     size = float(np.linalg.norm(force))
     watch = watched(unloaded.model)
@@ -307,31 +333,42 @@ def weight_test(
         unloaded=unloaded,
         states=tuple(states[1:]),
         events=events,
-        event_displacements=_displacements(model, branch, events),
+        event_displacements=_displacements(model, branch, events, at),
+        point=at,
     )
     if math.isinf(test.frictionless) and math.isfinite(test.tangent):
         problem = f"{np.abs(force).max():.3g} N moves the tip by rounding only; hang at least "
         raise InvalidInput("force", f"{problem}{_MEASURED * pose.arm.length * test.tangent:.1g} N.")
     if not pose.arm.has_friction:
         return test
-    first = None if followed else breakaway(held, unloaded.reference_tension, force, W)
+    hung = [combined(W, scaled(added, k / steps)) for k in range(steps + 1)]
+    first = None if followed else breakaway(held, unloaded.reference_tension, force, W, link, point)
     return WeightTest(
         force=force,
         unloaded=unloaded,
         states=test.states,
         breakaway=first,
-        history=load_cycle(pose, tension, W + np.arange(steps + 1)[:, None] / steps * added),
+        history=follow_loads(pose, tension, hung)[0],
+        point=at,
     )
 
 
-def _displacements(model: Model, branch: list[Stage], events: Sequence[Event]) -> Array:
-    """Return how far the tip has moved on a branch (m, 3) [m] at each of its events."""
-    tips = list[Array]()
+def _position(pose: Posture, point: LinkPoint | None) -> Array:
+    """Return the position (3,) [m] of a point of a link, or of the tip."""
+    return pose.tip[:3, 3] if point is None else point.position(pose)
+
+
+def _displacements(
+    model: Model, branch: list[Stage], events: Sequence[Event], point: LinkPoint | None
+) -> Array:
+    """Return how far the tip or a point has moved at each event of a branch (m, 3) [m]."""
+    start = _position(branch[0].pose, point)
+    moves = list[Array]()
     for event in events:
         near = min(branch, key=lambda stage: abs(stage.share - event.share))
         stage = equilibrium_near(model, event.share, near) or near
-        tips.append(stage.pose.tip[:3, 3] - branch[0].pose.tip[:3, 3])
-    return frozen(np.array(tips).reshape(-1, 3))
+        moves.append(_position(stage.pose, point) - start)
+    return frozen(np.array(moves).reshape(-1, 3))
 
 
 def _buckled(model: Model, branch: list[Stage], watch: Watched, force: Array) -> EquilibriumError:

@@ -7,17 +7,18 @@ from numpy.typing import ArrayLike
 
 from cdsm.definition import Term
 from cdsm.errors import InvalidInput
+from cdsm.loads import LoadsLike, loads_of
 from cdsm.manipulator import ANOTHER_ARM
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix.value import Stiffness
-from cdsm.support.validation import NO_WRENCH, instance, vector, wrench_vector
+from cdsm.support.validation import NO_WRENCH, instance, vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
-from cdsm.terms import ConstantPull, Stretch, total, without_cables
+from cdsm.terms import Applied, ConstantPull, Stretch, total, without_cables
 
 
 def stiffness(
-    pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
+    pose: Posture, tension: Tension | ArrayLike, wrench: LoadsLike | None = None
 ) -> Stiffness:
     """Compute the joint stiffness with its terms (Eq. 16), and the Cartesian stiffness.
 
@@ -26,7 +27,8 @@ def stiffness(
         tension: The result of :func:`~cdsm.distribute_tension` at this posture, or your own
             tensions (C,) [N], balanced or not; see :attr:`Stiffness.residual`.
         wrench: W (6,) at ``tool0`` in base axes, with your own tensions only: force [N], then
-            moment [N m]; default zero.
+            moment [N m]; default zero. Or loads on any links: a dict of wrenches (6,) by link, or
+            a list of :class:`~cdsm.Load`.
 
     Raises:
         InvalidInput: A shape is wrong, a tension negative, or of another posture or arm.
@@ -38,9 +40,9 @@ def stiffness(
 
 
 def checked_tension(
-    pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None
-) -> tuple[Array, Array]:
-    """Check the arguments of :func:`stiffness`; return tensions F (C,) [N] and wrench W (6,)."""
+    pose: Posture, tension: Tension | ArrayLike, wrench: LoadsLike | None
+) -> tuple[Array, Applied]:
+    """Check the arguments of :func:`stiffness`; return tensions F (C,) [N], and what acts."""
     arm = instance("pose", pose, Posture).arm
     if not isinstance(tension, Tension):
         F = vector("tension", tension, len(arm.cables), "one tension [N] per cable", "tension")
@@ -48,7 +50,7 @@ def checked_tension(
         if F[c] < 0.0:
             problem = f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
             raise InvalidInput("tension", problem)
-        return F, wrench_vector("wrench", NO_WRENCH if wrench is None else wrench)
+        return F, loads_of(arm, NO_WRENCH if wrench is None else wrench)
     if tension.posture is not pose:
         if not np.array_equal(tension.posture.q, pose.q):
             raise InvalidInput("tension", "is of another posture; distribute it at this one.")
@@ -56,13 +58,13 @@ def checked_tension(
             raise InvalidInput("tension", f"was distributed for {ANOTHER_ARM}")
     if wrench is not None:
         raise InvalidInput("wrench", "comes with the Tension; leave it out here.")
-    return tension.values, tension.wrench
+    return tension.values, tension.applied
 
 
 def assemble(
     pose: Posture,
     tension: Array,
-    wrench: Array,
+    wrench: Applied,
     cable_stiffness: Array,
     distribution: Tension | None = None,
     free_length: Array | None = None,
@@ -74,7 +76,7 @@ def assemble(
     return Stiffness(
         posture=pose,
         tension=tension,
-        wrench=wrench,
+        applied=wrench,
         cable_stiffness=cable_stiffness,
         terms=terms,
         joint=frozen(total([*terms.values()])),

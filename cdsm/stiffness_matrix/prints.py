@@ -15,6 +15,7 @@ from cdsm.quantities import display_for
 from cdsm.stiffness_matrix.verdict import least_joint_stiffness
 from cdsm.support.format import MODEL, coordinates, key, largest_finite, span
 from cdsm.support.values import Array
+from cdsm.terms import texts
 
 if TYPE_CHECKING:
     from cdsm.manipulator import Manipulator
@@ -97,7 +98,7 @@ def notes(K: Stiffness) -> tuple[str, ...]:
             missing = [f"{fixed}; cartesian: in the plane of other axes"]
     stiffness = f"smallest joint stiffness {least_joint_stiffness(K)}"
     least = f"{K.verdict.word}, {stiffness} ({model_of(K)})"
-    return (*missing, least)
+    return (*missing, *texts(K.applied), least)
 
 
 def model_of(K: Stiffness) -> str:

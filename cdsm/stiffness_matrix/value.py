@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm import readings
 from cdsm.errors import InvalidInput, SingularStiffness, listed
+from cdsm.loads import link_point
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints
 from cdsm.stiffness_matrix.report import Report
@@ -31,11 +32,11 @@ from cdsm.stiffness_matrix.spatial import (
 )
 from cdsm.stiffness_matrix.verdict import Verdict, describe_buckling, judge_stiffness
 from cdsm.support.format import coordinates, merged, prepare_json
-from cdsm.support.result import Result, quantity, tabulated, unit, unit_of
+from cdsm.support.result import Result, quantity, tabulated, unit_of
 from cdsm.support.validation import Direction, one_of, unit_direction, unit_directions
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
-from cdsm.terms import CABLE_TERMS, required_torque
+from cdsm.terms import CABLE_TERMS, Applied, described, required_torque, tip_only, tip_part
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,7 +62,7 @@ class Stiffness(Result):
             passive, gravity, load, springs, and those of :meth:`Manipulator.with_terms`.
         joint: K_θ, sum of the terms (nv, nv) [N m/rad]: row torque, column angle.
         tension: F (C,) [N].
-        wrench: W (6,): force [N], then moment [N m].
+        applied: What acts: W (6,) at the tip, or loads on links.
         cable_stiffness: Diagonal of K_L (C,) [N/m], of cables without friction; 0 for
             force-controlled ones.
         free_length: l_0 (C,) [m] held since another posture; None if motors are locked at this one.
@@ -79,13 +80,23 @@ class Stiffness(Result):
     terms: Mapping[str, Array]
     joint: Array = field(metadata=unit_of("joint_stiffness"))
     tension: Array = field(metadata=unit_of("tension"))
-    wrench: Array = field(metadata=unit("N and N m", "component"))
+    applied: Applied
     cable_stiffness: Array = field(metadata=unit_of("cable_stiffness"))
     free_length: Array | None = None
     distribution: Tension | None = None
     friction: FrictionState = "frictionless"
     segment_tension: Array | None = None
     tension_gradient: Array | None = None
+
+    @property
+    def wrench(self) -> Array:
+        """W (6,) at ``tool0``, base axes; InvalidInput if loads act on other links."""
+        return tip_only(self.applied)
+
+    @quantity("N and N m", "component", name="wrench")
+    def tip_wrench(self) -> Array:
+        """W (6,) of what acts at ``tool0``, base axes: force [N], then moment [N m]."""
+        return tip_part(self.applied)
 
     @tabulated
     def active(self) -> Array:
@@ -133,7 +144,7 @@ class Stiffness(Result):
         if self.segment_tension is not None:
             F = self.segment_tension
             J = pose.segments.length_jacobian
-        return frozen(F @ J - required_torque(pose, self.wrench))
+        return frozen(F @ J - required_torque(pose, self.applied))
 
     @tabulated
     def margin(self) -> float:
@@ -260,7 +271,9 @@ class Stiffness(Result):
             raise InvalidInput("directions", "are not orthogonal; give axes of a plane.")
         return self._cartesian_in(U)
 
-    def along(self, direction: Direction) -> float:
+    def along(
+        self, direction: Direction, link: str | None = None, point: ArrayLike | None = None
+    ) -> float:
         """Compute the tangent stiffness [N/m] that a small force along +u measures (Eq. 20).
 
         It is 1/(uᵀ C_vv u). Cables at 0 N (:attr:`slack`) only add tension: the stiffness is then
@@ -274,8 +287,28 @@ class Stiffness(Result):
         :func:`~cdsm.weight_test`. The stiffness is inf if the tip cannot move along u, and may be
         negative if the arm is unstable. SingularStiffness if K_θ is singular, or if the arm is
         unstable to one side: K_0 is not positive definite.
+
+        ``link`` is where the force acts and the displacement is read, instead of the tip: at the
+        ``point`` (3,) [m] in the frame of the link; None: its disk, or its frame (:class:`Load`).
         """
-        return self.tip_response(unit_direction("direction", direction))[0]
+        u = unit_direction("direction", direction)
+        J_v = None if link is None else self.jacobian_at(link, point)[:3]
+        return self.tip_response(u, J_v=J_v)[0]
+
+    def compliance_between(self, read: str, load: str) -> Array:
+        """Compute J_a K_θ⁻¹ J_bᵀ (6, 6): motion of the link ``read`` per wrench on ``load``.
+
+        The points of the links are those of :class:`~cdsm.Load`. Raises InvalidInput if there is no
+        such link, SingularStiffness as :attr:`compliance`.
+        """
+        J_a = self.jacobian_at(read, None)
+        return frozen(J_a @ self._inverse @ self.jacobian_at(load, None).T)
+
+    def jacobian_at(self, link: str, point: ArrayLike | None) -> Array:
+        """Compute J (6, nv) of a point of a link."""
+        if link == self.posture.arm.tip_link and point is None:
+            return self.posture.jacobian
+        return link_point(self.posture.arm, link, point).jacobian(self.posture)
 
     def pseudoinverse(self, term: str = "joint") -> Array:
         """Compute J⁺ᵀ K J⁺ (3, 3) [N/m], J the linear rows of J_X: the paper's K_R, read literally.
@@ -319,8 +352,12 @@ class Stiffness(Result):
             )
         return frozen(inverse)
 
-    def tip_response(self, u: Array, joints: Joints = slice(None)) -> tuple[float, Array]:
+    def tip_response(
+        self, u: Array, joints: Joints = slice(None), J_v: Array | None = None
+    ) -> tuple[float, Array]:
         """Compute the response to a tip force along a unit vector u (3,), other joints held.
+
+        ``J_v`` (3, nv) is the linear motion of another point, where the force acts instead.
 
         Returns:
             The stiffness along u [N/m], inf if the tip cannot move there, and the motion of the
@@ -329,7 +366,7 @@ class Stiffness(Result):
         Raises:
             SingularStiffness: As :meth:`joint_compliance`, or the arm is unstable to one side.
         """
-        J_v = self.posture.jacobian[:3]
+        J_v = self.posture.jacobian[:3] if J_v is None else J_v
         torque = (u @ J_v)[joints]
         moves = readings.moves_tip(torque, J_v)
         if not moves:
@@ -457,7 +494,8 @@ class Stiffness(Result):
 
     def to_dict(self) -> dict[str, object]:
         """Return the stiffness in SI for JSON, units in the keys; None for what does not exist."""
-        return merged(super().to_dict(), prepare_json(prints.readings(self)))
+        loads = {"loads": described(self.applied)} if described(self.applied) else {}
+        return merged(super().to_dict(), prepare_json(prints.readings(self) | loads))
 
     def __str__(self) -> str:
         return "\n".join([*self.warnings, *prints.table(self), *prints.notes(self)])

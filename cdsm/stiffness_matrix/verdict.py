@@ -18,7 +18,7 @@ from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.support.format import plural
 from cdsm.support.values import Array
-from cdsm.terms import ConstantPull, torque_size, without_cables
+from cdsm.terms import Applied, ConstantPull, torque_size, without_cables
 
 if TYPE_CHECKING:
     from cdsm.manipulator import Manipulator
@@ -126,7 +126,7 @@ def judge(findings: Iterable[Finding]) -> Verdict:
 
 def judge_stiffness(K: Stiffness) -> Verdict:
     """Return the verdict on an arm of which K_θ, tensions and wrench are known."""
-    imbalance = imbalance_of(K.posture, K.tension, K.wrench, K.residual)
+    imbalance = imbalance_of(K.posture, K.tension, K.applied, K.residual)
     return judge(
         [
             *_instability(K),
@@ -137,7 +137,7 @@ def judge_stiffness(K: Stiffness) -> Verdict:
     )
 
 
-def imbalance_of(pose: Posture, tension: Array, wrench: Array, residual: Array) -> Imbalance:
+def imbalance_of(pose: Posture, tension: Array, wrench: Applied, residual: Array) -> Imbalance:
     """Return the largest of the torques ``residual`` (nv,) that are missing for balance."""
     lever = pose.arm.levers
     missing = abs(residual * lever)

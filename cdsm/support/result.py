@@ -83,12 +83,14 @@ class _Quantity(cached_property[_T]):
     metadata: Mapping[str, Any]
 
 
-def quantity(unit_name: str, *dims: str) -> Callable[[Callable[[Any], _T]], cached_property[_T]]:
+def quantity(
+    unit_name: str, *dims: str, name: str = ""
+) -> Callable[[Callable[[Any], _T]], cached_property[_T]]:
     """Make a cached property that is printed and exported like a field with :func:`unit`."""
 
     def decorate(compute: Callable[[Any], _T]) -> cached_property[_T]:
         cached = _Quantity(compute)
-        cached.metadata = unit(unit_name, *dims)
+        cached.metadata = unit(unit_name, *dims, name=name)
         return cached
 
     return decorate

@@ -169,6 +169,10 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
 
 def wrench_vector(name: str, value: ArrayLike) -> Array:
     """Check a wrench: force [N], then moment [N m]. Return it as a read-only vector (6,)."""
+    items = value if isinstance(value, (list, tuple)) else [value]
+    if any(isinstance(item, Mapping) or hasattr(item, "link") for item in items):
+        problem = "has loads on links, which are not known here; give one wrench (6,) at the tip."
+        raise InvalidInput(name, problem)
     return vector(name, value, 6, WRENCH, "wrench")
 
 

@@ -12,17 +12,18 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from cdsm.cable import breaking_forces, largest_share
 from cdsm.errors import InvalidInput, solver_failed
+from cdsm.loads import LoadsLike, loads_of
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.support.format import aligned
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import NO_WRENCH, instance, one_of, wrench_vector
+from cdsm.support.validation import NO_WRENCH, instance, one_of
 from cdsm.support.values import Array, IndexedByName, draw, frozen
 from cdsm.tension.bounds import Bounds, bounds_at
 from cdsm.tension.infeasibility import infeasible
 from cdsm.tension.least_tensions import least_tensions
 from cdsm.tension.solvers import DEFAULT_SOLVER, OPTIMALITY, nondimensional
-from cdsm.terms import required_torque
+from cdsm.terms import Applied, required_torque, tip_only, tip_part
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +40,7 @@ class Tension(Result, IndexedByName):
     Attributes:
         posture: The posture.
         values: F (C,) [N], in the order of ``posture.arm.cables``.
-        wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
+        applied: What acts: W (6,) at the tip, or loads on links.
         minimum: Lower bounds (C,) [N] that were asked for.
         maximum: Upper bounds (C,) [N] that were asked for; inf for none.
         minimum_held: Lower bounds (C,) [N] that held: narrowed by the cables' own, by
@@ -55,7 +56,7 @@ class Tension(Result, IndexedByName):
 
     posture: Posture
     values: Array = field(metadata=unit("N", "cable", name="tension"))
-    wrench: Array = field(metadata=unit("N and N m", "component"))
+    applied: Applied
     minimum: Array = field(metadata=unit("N", "cable"))
     maximum: Array = field(metadata=unit("N", "cable"))
     minimum_held: Array = field(metadata=unit("N", "cable"))
@@ -63,11 +64,21 @@ class Tension(Result, IndexedByName):
     solver: str = field(metadata=unit("1"))
     least: bool = True
 
+    @property
+    def wrench(self) -> Array:
+        """W (6,) at ``tool0``, base axes; InvalidInput if loads act on other links."""
+        return tip_only(self.applied)
+
+    @quantity("N and N m", "component", name="wrench")
+    def tip_wrench(self) -> Array:
+        """W (6,) of what acts at ``tool0``, base axes: force [N], then moment [N m]."""
+        return tip_part(self.applied)
+
     @quantity("torque", "joint")
     def residual(self) -> Array:
         """Residual J_Lᵀ F − (J_Xᵀ W − g) of Eq. 13, (nv,) [N m]."""
         torque = self.values @ self.posture.length_jacobian
-        return frozen(torque - required_torque(self.posture, self.wrench))
+        return frozen(torque - required_torque(self.posture, self.applied))
 
     @quantity("1", "cable")
     def breaking_share(self) -> Array:
@@ -122,7 +133,7 @@ def distribute_tension(
     pose: Posture,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
-    wrench: ArrayLike = NO_WRENCH,
+    wrench: LoadsLike = NO_WRENCH,
     solver: str = DEFAULT_SOLVER,
     *,
     fixed: Mapping[str, float] | None = None,
@@ -134,7 +145,8 @@ def distribute_tension(
         pose: The posture.
         minimum: Lower bound [N], for all cables or (C,); not negative, since cables only pull.
         maximum: Upper bound [N], for all cables or (C,); inf: no bound. A cable's own also apply.
-        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]. Or loads on any
+            links: a dict of wrenches (6,) by link, or a list of :class:`~cdsm.Load`.
         solver: Any solver that qpsolvers finds installed; every solution is verified.
         fixed: Tensions [N] by cable name, e.g. of motors that control force. They replace the
             bounds of their cables; the other tensions are computed.
@@ -155,14 +167,14 @@ def distribute_tension(
     if not isinstance(tensions, Mapping):
         raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
     bounds = bounds_at(pose, minimum, maximum, worst_friction, fixed=tensions)
-    load = wrench_vector("wrench", wrench)
+    load = loads_of(pose.arm, wrench)
     return least_tension(pose, bounds, load, solver, tuple(tensions))
 
 
 def least_tension(
     pose: Posture,
     bounds: Bounds,
-    wrench: Array,
+    wrench: Applied,
     solver: str = DEFAULT_SOLVER,
     fixed: Collection[str] = (),
 ) -> Tension:
@@ -181,4 +193,4 @@ def least_tension(
     if not solution.ok:
         raise solver_failed(solver, solution.message)
     F = frozen(solution.x * problem.force)
-    return Tension(posture=pose, values=F, wrench=wrench, solver=solver, **bounds._asdict())
+    return Tension(posture=pose, values=F, applied=wrench, solver=solver, **bounds._asdict())

@@ -1,0 +1,329 @@
+"""Loads on any links: torque, stiffness, balance and readings where they hang."""
+
+from collections.abc import Callable
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.loads import loads_of
+from cdsm.support.values import Array
+from cdsm.terms import as_loads, between, combined
+
+SIZES = {
+    "link_length": 0.06,
+    "base_length": 0.03,
+    "disk_offset": 0.012,
+    "hole_radius": 0.025,
+    "link_mass": 0.12,
+    "lead": 0.3,
+}
+Q = np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0.0])
+THREE = [
+    cdsm.Load("link2", force=(0.0, 0.0, -3.0), point=(0.0, 0.0, -0.025)),
+    cdsm.Load("link3", force=(0.0, 2.0, 0.0), moment=(0.0, 0.0, 0.05)),
+    cdsm.Load("tool0", force=(1.0, 0.0, -2.0), moment=(0.0, 0.02, 0.0)),
+]
+
+
+def universal() -> cdsm.Manipulator:
+    geometry = cdsm.Geometry.universal(joints=4, cables_per_joint=3, **SIZES)
+    return cdsm.Manipulator(geometry, elasticity=cdsm.presets.STRAND_1X19)
+
+
+def hinged() -> cdsm.Manipulator:
+    geometry = cdsm.Geometry.hinged(joints=4, twist=1.5707963, **SIZES)
+    return cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e4))
+
+
+def coupled() -> cdsm.Manipulator:
+    geometry = cdsm.Geometry.universal(
+        joints=4, cables_per_joint=3, coupled=True, joint_stiffness=0.8, **SIZES
+    )
+    return cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e4))
+
+
+def backbone() -> cdsm.Manipulator:
+    section = {
+        "length": 0.27,
+        "disks": 10,
+        "hole_radius": 0.008,
+        "hole_angles": [0.0, 2.1, 4.2],
+        "lead": 0.05,
+    }
+    geometry = cdsm.Geometry.backbone(
+        sections=[section],
+        outer_diameter=1e-3,
+        youngs_modulus=81e9,
+        mass_per_length=0.002 / 0.027,
+        joint_limit=1.2,
+    )
+    cables = cdsm.serpentine_cables(geometry, cdsm.LinearElasticity(1e5), control="force")
+    return cdsm.Manipulator(geometry, cables=cables, gravity=(0.0, 0.0, -9.81))
+
+
+ARMS = [universal, hinged, coupled, backbone]
+
+
+def some_loads(arm: cdsm.Manipulator, scale: Array, rng: np.random.Generator) -> list[cdsm.Load]:
+    """Loads at points off the axis of three links."""
+    names = [name for name in arm.body.link_names if name.startswith(("link", "disk"))]
+    links = names[len(names) // 3], names[2 * len(names) // 3], names[-1]
+    wrenches = rng.normal(size=(3, 6)) * scale
+    points = rng.normal(size=(3, 3)) * 0.01
+    return [
+        cdsm.Load(link, tuple(W[:3]), tuple(W[3:]), tuple(p))
+        for link, W, p in zip(links, wrenches, points, strict=True)
+    ]
+
+
+def slope(function: Callable[[Array], Array], q: Array, step: float) -> Array:
+    rows = [
+        (function(q + step * e) - function(q - step * e)) / (2.0 * step) for e in np.eye(q.size)
+    ]
+    return np.array(rows).T
+
+
+@pytest.mark.parametrize("make", ARMS)
+@pytest.mark.parametrize("moments", [0.0, 0.3])
+def test_stiffness_is_the_derivative_of_the_torque(
+    make: Callable[[], cdsm.Manipulator], moments: float
+) -> None:
+    arm = make()
+    rng = np.random.default_rng(1)
+    q = rng.uniform(-0.2, 0.2, arm.nv)
+    loads = as_loads(loads_of(arm, some_loads(arm, np.repeat([5.0, moments], 3), rng)))
+
+    def torque(q: Array) -> Array:
+        return loads.torque(arm.at(q, check_limits=False))
+
+    K = loads.stiffness(arm.at(q, check_limits=False))
+    off = [abs(slope(torque, q, h) - K).max() / abs(K).max() for h in (1e-2, 5e-3, 2.5e-3)]
+    assert off[-1] < 2e-5
+    assert np.log2(off[0] / off[1]) == pytest.approx(2.0, abs=0.02)
+    assert np.log2(off[1] / off[2]) == pytest.approx(2.0, abs=0.02)
+    if moments == 0.0:
+        pose = arm.at(q, check_limits=False)
+        potential = loads.measured_from(pose)
+        fall = slope(lambda q: np.array([potential.energy(arm.at(q, check_limits=False))]), q, 1e-6)
+        np.testing.assert_allclose(fall[0], loads.torque(pose), atol=2e-9)
+
+
+@pytest.mark.parametrize("make", ARMS)
+def test_a_load_at_the_tip_is_the_wrench_bit_by_bit(make: Callable[[], cdsm.Manipulator]) -> None:
+    arm = make()
+    rng = np.random.default_rng(2)
+    pose = arm.at(rng.uniform(-0.1, 0.1, arm.nv), check_limits=False)
+    W = rng.normal(size=6)
+    F = rng.uniform(1.0, 20.0, len(arm.cables)) + 30.0
+    today = cdsm.stiffness(pose, F, W)
+    for given in ({arm.tip_link: W}, [cdsm.Load(arm.tip_link, tuple(W[:3]), tuple(W[3:]))]):
+        K = cdsm.stiffness(pose, F, given)
+        np.testing.assert_array_equal(K.wrench, W)
+        np.testing.assert_array_equal(K.joint, today.joint)
+        np.testing.assert_array_equal(K.residual, today.residual)
+    assert K.along("z", link=arm.tip_link) == today.along("z")
+    tip = as_loads(W)
+    spot = loads_of(arm, cdsm.Load(arm.tip_link, tuple(W[:3]), tuple(W[3:]), (1e-300, 0, 0)))
+    np.testing.assert_allclose(as_loads(spot).torque(pose), tip.torque(pose), atol=1e-14)
+    np.testing.assert_allclose(as_loads(spot).stiffness(pose), tip.stiffness(pose), atol=1e-14)
+
+
+def test_tensions_and_stiffness_of_an_arm_with_loads_on_its_links() -> None:
+    pose = universal().at(Q)
+    hung = [
+        cdsm.Load("link2", force=(0.0, 0.0, -9.81), point=(0.0, 0.0, 0.0)),
+        cdsm.Load("link4", force=(0.0, 0.0, -4.9), point=(0.0, 0.0, 0.0)),
+    ]
+    alone = cdsm.distribute_tension(pose, 50.0)
+    tension = cdsm.distribute_tension(pose, 50.0, wrench=hung)
+    assert abs(tension.residual).max() < 1e-12
+    assert alone.values.max() == pytest.approx(95.6, abs=0.05)
+    assert tension.values.max() == pytest.approx(112.5, abs=0.05)
+    K = cdsm.stiffness(pose, tension)
+    assert abs(K.residual).max() < 1e-12
+    assert "load on link2" in str(K)
+    assert [load["link"] for load in K.to_dict()["loads"]] == ["link2", "link4"]
+    assert K.report().passed
+    soft = [K.along("z", link=link) for link in ("link2", "link3", "tool0")]
+    np.testing.assert_allclose(soft, [17.39e3, 8.87e3, 3.41e3], rtol=2e-3)
+    assert soft[2] == K.along("z")
+    C = K.compliance_between("tool0", "link2")
+    np.testing.assert_allclose(C, K.compliance_between("link2", "tool0").T, atol=1e-15)
+    with pytest.raises(cdsm.InvalidInput, match="loads act on link2, link4"):
+        _ = K.wrench
+    mixed = cdsm.distribute_tension(pose, 10.0, wrench=THREE)
+    other = cdsm.distribute_tension(pose, 10.0, wrench=THREE[::-1])
+    np.testing.assert_allclose(mixed.values, other.values, rtol=1e-12)
+
+
+def test_a_rest_under_loads_is_where_more_load_moves_it_by_the_compliance() -> None:
+    pose = universal().at(Q)
+    F = cdsm.distribute_tension(pose, minimum=50.0).values
+    rest = cdsm.equilibrium(pose, F, THREE)
+    assert abs(rest.residual).max() < 1e-10
+    W = np.zeros(6)
+    W[2] = 1.0
+    off = []
+    for h in (0.2, 0.1):
+        more = [combined(rest.applied, loads_of(pose.arm, {"link2": s * h * W})) for s in (1, -1)]
+        q = [cdsm.equilibrium(pose, F, load).pose.q for load in more]
+        moved = (q[0] - q[1]) / (2.0 * h)
+        J = rest.stiffness.jacobian_at("link2", None)
+        expected = rest.stiffness.joint_compliance() @ J.T @ W
+        off.append(abs(moved - expected).max() / abs(expected).max())
+    assert off[1] < 2e-6
+    assert off[0] / off[1] == pytest.approx(4.0, rel=0.3)
+    half = between(np.zeros(6), rest.applied, 0.5)
+    np.testing.assert_allclose(
+        as_loads(half).torque(pose), as_loads(rest.applied).torque(pose) / 2.0, atol=1e-15
+    )
+
+
+def _add_mass(root: ElementTree.Element, link: str, x: float) -> None:
+    extra = ElementTree.SubElement(root, "link", name=f"weight_{link}")
+    inertial = ElementTree.SubElement(extra, "inertial")
+    ElementTree.SubElement(inertial, "mass", value="0.004")
+    inertia = dict.fromkeys(("ixx", "iyy", "izz"), "1e-9") | dict.fromkeys(
+        ("ixy", "ixz", "iyz"), "0"
+    )
+    ElementTree.SubElement(inertial, "inertia", inertia)
+    joint = ElementTree.SubElement(root, "joint", name=f"hung_{link}", type="fixed")
+    ElementTree.SubElement(joint, "origin", xyz=f"{x!r} 0 0", rpy="0 0 0")
+    ElementTree.SubElement(joint, "parent", link=link)
+    ElementTree.SubElement(joint, "child", link=f"weight_{link}")
+
+
+def test_torques_are_those_of_mujoco() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    stiff = universal()
+    cables = [
+        cdsm.Cable(cable.name, cable.sites, cdsm.LinearElasticity(2e4), lead=0.0)
+        for cable in stiff.cables
+    ]
+    arm = stiff.with_cables(cables)
+    pose = arm.at(Q)
+    F = cdsm.distribute_tension(pose, minimum=50.0).values
+    loads = as_loads(loads_of(arm, THREE))
+    model = mujoco.MjModel.from_xml_string(cdsm.to_mjcf(arm, pose, F, actuators="none"))
+    data = mujoco.MjData(model)
+    joint = mujoco.mjtObj.mjOBJ_JOINT
+    order = [mujoco.mj_name2id(model, joint, name) for name in arm.joint_names]
+    place = model.jnt_qposadr[order]
+
+    def applied(pose: cdsm.Posture) -> Array:
+        data.qpos[place] = pose.q
+        data.qvel[:] = 0.0
+        mujoco.mj_forward(model, data)
+        torque = np.zeros(model.nv)
+        tip = pose.tip[:3, 3]
+        points = [(load.at.link, load.at.position(pose), load.wrench) for load in loads.on_links]
+        for link, p, W in [*points, ("link4", tip, loads.tip_wrench)]:
+            body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, link)
+            mujoco.mj_applyFT(model, data, W[:3], W[3:], p, body, torque)
+        return np.asarray(torque[place])
+
+    np.testing.assert_allclose(applied(pose), -loads.torque(pose), atol=1e-15)
+    rest = cdsm.equilibrium(pose, F, THREE)
+    pushed = applied(rest.pose)
+    net = pushed + (data.qfrc_passive - data.qfrc_bias)[place]
+    assert abs(net).max() < 1e-12
+    assert 1e3 * rest.moved == pytest.approx(0.18, abs=0.01)
+
+
+def test_weights_on_disks_are_heavier_disks() -> None:
+    arm = backbone()
+    root = ElementTree.fromstring(arm.urdf)
+    hung = [cdsm.Load(f"disk{i}", force=(0.0, 0.0, -9.81 * 0.004)) for i in (3, 6, 9)]
+    for load in hung:
+        x = next(disk.x for disk in arm.geometry.disks if disk.link == load.link)
+        _add_mass(root, load.link, x)
+    heavy = cdsm.Manipulator.from_urdf(
+        ElementTree.tostring(root, encoding="unicode"),
+        cables=arm.cables,
+        gravity=(0.0, 0.0, -9.81),
+        springs=arm.springs.given,
+        tip=arm.tip_link,
+    )
+    F = np.array([1.0, 0.5, 0.0])
+    one = cdsm.forward_statics(arm, tension=F, wrench=hung).pose.tip[:3, 3]
+    two = cdsm.forward_statics(heavy, tension=F).pose.tip[:3, 3]
+    np.testing.assert_allclose(one, two, atol=1e-11)
+    disk = next(disk for disk in arm.geometry.disks if disk.link == "disk3")
+    assert disk.x > 0.0
+    (load, *_) = as_loads(loads_of(arm, hung)).on_links
+    np.testing.assert_array_equal(load.at.local, [disk.x, 0.0, 0.0])
+    pose = arm.at(np.full(arm.nv, 0.02))
+    centre = (pose.link_pose("disk3") @ [disk.x, 0.0, 0.0, 1.0])[:3]
+    np.testing.assert_allclose(load.at.position(pose), centre, atol=1e-15)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_a_weight_on_a_link_measures_the_stiffness_there(friction: float) -> None:
+    arm = universal().with_friction(friction)
+    pose = arm.at(Q)
+    tension = cdsm.distribute_tension(pose, 50.0)
+    K = cdsm.stiffness(pose, tension)
+    test = cdsm.weight_test(pose, tension, [0.0, 0.0, -0.01], link="link2")
+    assert test.tangent == pytest.approx(K.along("z", link="link2"), rel=1e-9)
+    if friction == 0.0:
+        assert test.stiffness == pytest.approx(test.tangent, rel=1e-3)
+    else:
+        assert test.stuck is not None
+        assert test.breakaway_load is not None
+        assert test.breakaway_load > 0.01
+        assert test.stiffness == pytest.approx(test.stuck, rel=1e-3)
+    same = cdsm.weight_test(pose, tension, [0.0, 0.0, -0.01], link="tool0")
+    tip = cdsm.weight_test(pose, tension, [0.0, 0.0, -0.01])
+    assert same.stiffness == pytest.approx(tip.stiffness, rel=1e-9)
+    if friction > 0.0:
+        return
+    rows = {"link2": [[0.0, 0.0, -0.01, 0.0, 0.0, 0.0]]}
+    history = cdsm.load_cycle(pose, tension, rows)
+    np.testing.assert_allclose(history.pose(0).q, test.states[-1].pose.q, atol=1e-5)
+
+
+def test_forward_statics_under_loads_on_disks() -> None:
+    arm = backbone()
+    F = np.full(len(arm.cables), 0.5)
+    hung = {"disk5": [0.0, 0.0, -0.02, 0.0, 0.0, 0.0]}
+    rest = cdsm.forward_statics(arm, tension=F, wrench=hung)
+    assert abs(rest.residual).max() < 1e-10
+    assert "load on disk5" in str(rest)
+    rough = cdsm.forward_statics(arm.with_friction(1e-5), tension=F, wrench=hung)
+    np.testing.assert_allclose(rough.pose.tip[:3, 3], rest.pose.tip[:3, 3], atol=1e-5)
+    assert rough.stiffness.applied is not None
+    assert abs(rough.residual).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("wrench", "message"),
+    [
+        ({"lnik2": np.zeros(6)}, "link2"),
+        ({"base_link": np.ones(6)}, "is the base"),
+        ([cdsm.Load("link2", force=(1, 0, 0)), cdsm.Load("link2", force=(0, 1, 0))], "two loads"),
+        ({"link2": [1.0, 0.0, 0.0]}, "link2.*shape"),
+        ([cdsm.Load("link2"), [0.0] * 6], "is no Load"),
+    ],
+)
+def test_wrong_loads_are_named(wrench: object, message: str) -> None:
+    pose = universal().at(Q)
+    with pytest.raises(cdsm.InvalidInput, match=message):
+        cdsm.distribute_tension(pose, 10.0, wrench=wrench)  # type: ignore[arg-type]
+
+
+def test_what_knows_only_a_wrench_at_the_tip_says_so() -> None:
+    pose = universal().at(Q)
+    hung = {"link2": [0.0, 0.0, -1.0, 0.0, 0.0, 0.0]}
+    tension = cdsm.distribute_tension(pose, 10.0, wrench=hung)
+    K = cdsm.stiffness(pose, tension)
+    assert "load on link2" in cdsm.to_mjcf(pose.arm, pose, tension)
+    with pytest.raises(cdsm.InvalidInput, match="loads act on link2"):
+        cdsm.uncertainty(pose, tension, cdsm.Tolerances(joint_angle=0.01), direction="z")
+    for function in (cdsm.payload, cdsm.critical_load, cdsm.critical_tension):
+        options = {"load": [0, 0, -1, 0, 0, 0]} if function is cdsm.critical_load else {}
+        with pytest.raises(cdsm.InvalidInput, match="loads on links"):
+            function(pose, wrench=hung, **options)  # type: ignore[operator]
+    with pytest.raises(cdsm.InvalidInput, match="wrench"):
+        cdsm.evaluate(pose.arm, Q[None], None, hung, ("margin",))  # type: ignore[arg-type]
