@@ -60,7 +60,8 @@ def plot_shares(shares: Shares, ax: Axes | None = None, *, title: str | None = N
     panel.set_xlim(low.min() - 0.02 * width, high.max() + 0.17 * width)
     direction = style.direction_name(shares.direction)
     panel.set_xlabel(f"contribution [N/mm] to {total:.4g} N/mm along {direction}")
-    panel.legend(loc="upper left", bbox_to_anchor=(0.0, -0.42 / _height(panel)), ncols=2)
+    # to the left, where names of cables leave room
+    panel.legend(loc="upper right", bbox_to_anchor=(1.0, -0.42 / _height(panel)), ncols=2)
     unstable = "" if shares.is_stable else "UNSTABLE: "
     style.set_title(panel, title, f"{unstable}{arm.name}: what makes it stiff?")
     return panel

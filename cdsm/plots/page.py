@@ -25,6 +25,7 @@ from cdsm.plots.bars import plot_shares, plot_tensions
 from cdsm.plots.curves import plot_stiffness_over_tension
 from cdsm.plots.measured import plot_uncertainty
 from cdsm.plots.style import MM, N_PER_MM
+from cdsm.quantities import display_for
 from cdsm.stiffness_matrix import prints
 from cdsm.stiffness_matrix.report import tables
 from cdsm.support.format import coordinates, place, span, without_rounding
@@ -128,11 +129,10 @@ def _sentence(report: Report) -> str:
     pull = f"cables pull {span(K.tension, '{:.3g}'.format)} N"
     if moves[0] == 0.0:
         return f"{verdict} No force moves the tip; {pull}."
-    stiffness = N_PER_MM / moves[0]
-    return (
-        f"{verdict} One newton moves the tip by up to {MM * moves[0]:.3g} mm "
-        f"({stiffness:.3g} N/mm), most along {prints.axis_of(axes[:, 0])}; {pull}."
-    )
+    unit, size = display_for("N/m", 1.0 / moves[0])
+    direction = prints.axis_of(axes[:, 0])
+    softest = f"{1.0 / (moves[0] * size):.3g} {unit} along {direction}"
+    return f"{verdict} The tip is softest with {softest}; {pull}."
 
 
 def _count(report: Report) -> str:

@@ -111,6 +111,8 @@ def test_an_arm_that_holds_has_pictures_and_one_that_does_not_says_so_first() ->
     for part in ("arm-compliance", "curve-along", "curve-here", "tensions-bound:minimum"):
         assert f'id="{part}"' in held
     assert "How sure is it?" in held
+    softest = 1e-3 / np.linalg.norm(REPORTS["PASS"].stiffness.compliance[:3, :3], 2)
+    assert f"The tip is softest with {softest:.3g} N/mm along (" in held
     assert "load at the tip: force (0, 0.3, -2) N, moment (0.01, 0, 0) N m" in held
     limp = REPORTS["FAIL"].to_html()
     assert 'class="pill fail">FAIL<' in limp
