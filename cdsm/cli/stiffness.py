@@ -54,6 +54,7 @@ def show_stiffness(
     Exit code 0; 3 if the arm is unstable, or the report of --check fails.
     """
     from cdsm.cable import largest_share
+    from cdsm.support.format import stiffness_text
 
     robot = options.load_arm(arm, changes)
     wrench = options.load_at_tip(robot, load, mass)
@@ -66,7 +67,7 @@ def show_stiffness(
         axes[direction] = u = options.parse_direction(direction)
         k = (rest or K).along(u)
         numbers |= {"direction": u, "along_direction_N_per_m": k}
-        lines.append(f"along {direction}: {k / 1e3:.4g} N/mm")
+        lines.append(f"along {direction}: {stiffness_text(k)}")
     share = largest_share(K.posture.arm.cables, K.tension)
     numbers |= {"largest_share_of_breaking_force": share} if share else {}
     lines += [share] if share and K.distribution is None else []  # a Tension prints it itself
@@ -128,6 +129,8 @@ def _sticking(
     tension: cdsm.Tension | None, axes: dict[str, Sequence[float]]
 ) -> tuple[list[str], Json]:
     """Return the stuck stiffness and the load of the first slip, as text and for JSON, if any."""
+    from cdsm.support.format import stiffness_text
+
     lines = list[str]()
     numbers = Json()
     if tension is None or not tension.posture.arm.has_friction:
@@ -137,7 +140,7 @@ def _sticking(
             first = cdsm.breakaway(tension.posture, tension, u)
             if 0.0 < first.load < math.inf:
                 k = first.stiffness.along(u)
-                lines.append(f"along {name} {k / 1e3:.4g} N/mm below {first.load:.4g} N")
+                lines.append(f"along {name} {stiffness_text(k)} below {first.load:.4g} N")
                 numbers[name] = {"stuck_N_per_m": k, "breakaway_N": first.load}
     if not lines:
         return [], {}

@@ -17,6 +17,7 @@ from cdsm.statics.load_cycle import follow_loads
 from cdsm.statics.quasi_static import EquilibriumPath
 from cdsm.statics.weight_test import weight_test
 from cdsm.stiffness_matrix import stiffness
+from cdsm.support.format import stiffness_text
 from cdsm.support.validation import (
     SMALLEST,
     Axis,
@@ -112,7 +113,7 @@ class Measurement:
 
     def described(self, measured: Array, predicted: Array) -> list[str]:
         """Return a measured and a predicted stiffness as texts."""
-        return [f"{K[0] / 1e3:.4g} N/mm" for K in (measured, predicted)]
+        return [stiffness_text(K[0]) for K in (measured, predicted)]
 
 
 @final

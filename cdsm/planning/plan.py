@@ -15,7 +15,7 @@ from cdsm.planning.tension_space import TensionSpace
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.prints import frictionless_model
-from cdsm.support.format import coordinates
+from cdsm.support.format import coordinates, stiffness_text
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import (
     NO_WRENCH,
@@ -99,10 +99,10 @@ class StiffnessPlan(Result):
         return axes
 
     def __str__(self) -> str:
-        pairs = np.reshape([self.achieved, self.target], (2, -1)).T / 1e3
-        wanted = "N/mm or more" if self.at_least else "N/mm"
+        pairs = np.reshape([self.achieved, self.target], (2, -1)).T
+        wanted = "or more wanted" if self.at_least else "wanted"
         rows = [
-            f"along {coordinates(u)}: {value:.4g} N/mm ({target:.4g} {wanted} wanted)"
+            f"along {coordinates(u)}: {stiffness_text(value)} ({stiffness_text(target)} {wanted})"
             for u, (value, target) in zip(self.direction.reshape(-1, 3), pairs, strict=True)
         ]
         margin = f"{self.stiffness.margin:.4g} {self.posture.arm.stiffness_unit()}"

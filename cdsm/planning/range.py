@@ -14,7 +14,7 @@ from cdsm.planning.tension_space import TensionSpace
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.stiffness_matrix.prints import frictionless_model
-from cdsm.support.format import coordinates, span
+from cdsm.support.format import coordinates, span, stiffness_text
 from cdsm.support.progress import progress_bar
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, Direction, unit_direction, whole_number
@@ -88,11 +88,10 @@ class StiffnessRange(Result, Plotted):
         return self.low <= target <= self.high
 
     def __str__(self) -> str:
-        (low, high) = self.ends / 1e3
         limited = self.limited_by_stability
-        along = f"along {coordinates(self.direction)} the stiffness can be {low:.4g} to {high:.4g}"
+        along = f"along {coordinates(self.direction)} the stiffness can be"
         arm = self.posture.arm
-        lines = [f"{along} N/mm ({frictionless_model(arm)})"]
+        lines = [f"{along} {stiffness_text(*self.ends)} ({frictionless_model(arm)})"]
         unit = arm.stiffness_unit()
         tensions = {"softest": self.low_tension, "stiffest": self.high_tension}
         for (name, F), stops in zip(tensions.items(), limited, strict=True):

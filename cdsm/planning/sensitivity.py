@@ -17,7 +17,7 @@ from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.prints import frictionless_model
-from cdsm.support.format import aligned, coordinates, without_rounding
+from cdsm.support.format import aligned, coordinates, stiffness_text, without_rounding
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import NO_WRENCH, Direction, bound, instance, scalar, unit_direction
 from cdsm.support.values import Array, draw, frozen
@@ -187,7 +187,7 @@ class Saturation(Result):
     def __str__(self) -> str:
         end = self.minimum[-1]
         along = f"the stiffness along {coordinates(self.direction)}"
-        most = f"{along} is at most {self.along.max() / 1e3:.4g} N/mm, at a lower bound of "
+        most = f"{along} is at most {stiffness_text(self.along.max())}, at a lower bound of "
         lines = [f"{most}{self.stiffest:.4g} N"]
         if math.isinf(self.bound):
             lines = [f"{along} does not saturate: it still rises at {end:.4g} N"]

@@ -21,7 +21,7 @@ from cdsm.statics.load_cycle import LoadHistory, follow_loads
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.stiffness_matrix.prints import frictionless_model
-from cdsm.support.format import coordinates, plural, without_rounding
+from cdsm.support.format import coordinates, plural, stiffness_text, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import unit_direction, vector, whole_number
 from cdsm.support.values import Array, Plotted, frozen
@@ -208,8 +208,8 @@ class WeightTest(Result, Plotted):
             rows.append(f"{name:>10}" + "".join(f"{1e3 * x:>12.4g}" for x in moved))
         model = frictionless_model(self.unloaded.pose.arm)
         rows += [
-            f"stiffness along the force: measured {self.stiffness / 1e3:.4g} N/mm, "
-            f"linear {self.tangent / 1e3:.4g} N/mm",
+            f"stiffness along the force: measured {stiffness_text(self.stiffness)}, "
+            f"linear {stiffness_text(self.tangent)}",
             f"(linear is {model}; measured the secant over this weight)",
             *events_text(self.events),
             *self._about_friction(),
@@ -233,7 +233,7 @@ class WeightTest(Result, Plotted):
             goes_on = "the weight goes on from a rest with friction; under the full one"
             return [
                 f"{goes_on} {slide}; without friction it would measure "
-                f"{self.frictionless / 1e3:.4g} N/mm"
+                f"{stiffness_text(self.frictionless)}"
             ]
         if self.breakaway_load == 0.0:
             reason = "friction holds no cable here: "
@@ -244,13 +244,13 @@ class WeightTest(Result, Plotted):
             slides = "under this weight the arm does not slide yet: hang more"
         return [
             f"below {self.breakaway_load:.4g} N all cables stick: a weight measures "
-            f"{self.stuck / 1e3:.4g} N/mm",
+            f"{stiffness_text(self.stuck)}",
             slides,
-            f"this weight, {self.loads[-1]:.4g} N, measures {self.stiffness / 1e3:.4g} N/mm; "
+            f"this weight, {self.loads[-1]:.4g} N, measures {stiffness_text(self.stiffness)}; "
             f"{slide}",
             "so take the difference of two weights with which they slide, and compare it with "
             "theirs without friction; this weight alone would measure "
-            f"{self.frictionless / 1e3:.4g} N/mm without friction",
+            f"{stiffness_text(self.frictionless)} without friction",
         ]
 
 

@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.quantities import UNITS_OF_JOINTS
+from cdsm.quantities import UNITS_OF_JOINTS, display_for
 from cdsm.status import Status
 from cdsm.support.values import Array
 
@@ -56,6 +56,12 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
 def largest_finite(values: Array) -> float:
     """Return the largest magnitude among the finite values; 0 if there are none."""
     return float(abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def stiffness_text(*values: float) -> str:
+    """Return a stiffness [N/m], or a range, in a unit for its size: ``3.2 N/mm``, ``0.67 N/m``."""
+    unit, size = display_for("N/m", largest_finite(np.array(values)))
+    return f"{' to '.join(f'{value / size:.4g}' for value in values)} {unit}"
 
 
 _ROUNDING = 1e-9  # a number of a table below this fraction of the largest is printed as zero

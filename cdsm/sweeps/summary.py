@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from cdsm.quantities import QUANTITIES, display_of, si_of
-from cdsm.support.format import aligned, one_unit, span
+from cdsm.quantities import QUANTITIES, display_for, si_of
+from cdsm.support.format import aligned, largest_finite, one_unit, span
 from cdsm.support.status import status_names
 from cdsm.support.values import Array
 
@@ -27,13 +27,14 @@ def numbers_of(dataset: xarray.Dataset) -> dict[str, tuple[str, Array]]:
     numbers: dict[str, tuple[str, Array]] = {}
     for name in (name for name in dataset.data_vars if name in QUANTITIES):
         variable = dataset[name]
-        unit, size = display_of(si_of(variable.units))
-        unit = one_unit(unit.strip("1"))
+        columns: dict[str, Array] = {}
         if {*variable.dims} - {*entry} == {"direction"}:
-            for label, column in variable.groupby("direction"):
-                numbers[f"{name} {label}"] = unit, _existing(column.values / size)
+            columns = {f"{name} {u}": part.values for u, part in variable.groupby("direction")}
         elif {*variable.dims} <= {*entry}:
-            numbers[str(name)] = unit, _existing(variable.values / size)
+            columns = {str(name): variable.values}
+        for label, values in columns.items():
+            unit, size = display_for(si_of(variable.units), largest_finite(values))
+            numbers[label] = one_unit(unit.strip("1")), _existing(values / size)
     return numbers
 
 
@@ -62,14 +63,18 @@ def curve_lines(dataset: xarray.Dataset) -> list[str]:
     columns: list[tuple[str, ...]] = [("least tension [N]", *held)]
     for name in (name for name in dataset.data_vars if name in QUANTITIES):
         variable = dataset[name]
-        unit, size = display_of(si_of(variable.units))
-        head = f"{name} [{one_unit(unit)}]" if unit.strip("1") else str(name)
+        curves: dict[str, Array] = {}
         if variable.dims == ("minimum", "direction"):
-            for label, column in variable.groupby("direction"):
-                values = column.values.ravel() / size
-                columns.append((head.replace("along", f"along {label}"), *map(_text, values)))
+            parts = variable.groupby("direction")
+            curves = {
+                str(name).replace("along", f"along {u}"): part.values.ravel() for u, part in parts
+            }
         elif variable.dims == ("minimum",):
-            columns.append((head, *map(_text, variable.values / size)))
+            curves = {str(name): variable.values}
+        for label, values in curves.items():
+            unit, size = display_for(si_of(variable.units), largest_finite(values))
+            head = f"{label} [{one_unit(unit)}]" if unit.strip("1") else label
+            columns.append((head, *map(_text, values / size)))
     columns.append(("status", *(words[code] for code in dataset["status"].values.tolist())))
     return aligned(list(zip(*columns, strict=True)))
 
