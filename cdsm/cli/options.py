@@ -78,6 +78,10 @@ LoadOption = Annotated[
 MassOption = Annotated[
     float | None, opt("Mass that hangs at the tip; adds to --load.", "KG", min=0.0)
 ]
+_LOADS = "Force [N], moment [N m], base axes, at the tip or @LINK. Repeat for more links."
+LoadsOption = Annotated[list[str] | None, opt(_LOADS, "FX,FY,FZ[,MX,MY,MZ][@LINK]", "--load")]
+_MASSES = "Mass that hangs at the tip or @LINK; adds to --load. Repeat for more links."
+MassesOption = Annotated[list[str] | None, opt(_MASSES, "KG[@LINK]", "--mass")]
 FigureOption = Annotated[Path | None, file_opt("Figure to write.", "FILE.pdf|svg|png", "--figure")]
 JsonOption = Annotated[bool, opt("Print answer (SI) and errors as JSON.", None, "--json")]
 
@@ -125,6 +129,27 @@ def load_at_tip(arm: cdsm.Manipulator, load: str | None, mass: float | None = No
         raise misuse("--mass", "has no weight without gravity.")
     wrench[:3] += number_array("--mass", mass or 0.0, "mass") * arm.gravity
     return wrench
+
+
+def loads_on(
+    arm: cdsm.Manipulator, loads: Iterable[str] | None, masses: Iterable[str] | None
+) -> dict[str, Array]:
+    """Return the wrenches (6,) of all --load and --mass by links, the tip among them."""
+    import numpy as np
+
+    wrenches = {arm.tip_link: np.zeros(6)}
+    for text in loads or ():
+        components, _, link = text.partition("@")
+        name = link or arm.tip_link
+        wrenches[name] = wrenches.get(name, np.zeros(6)) + load_at_tip(arm, components)
+    for text in masses or ():
+        number, _, link = text.partition("@")
+        (mass,) = parse_numbers("--mass", number, (1,), "KG or KG@LINK")
+        if mass < 0.0:
+            raise misuse("--mass", f"{mass:g} kg given; give a mass from 0 kg on.")
+        name = link or arm.tip_link
+        wrenches[name] = wrenches.get(name, np.zeros(6)) + load_at_tip(arm, None, mass)
+    return wrenches
 
 
 _TINY = 0.2  # largest angle [deg] that looks as if it is in radians

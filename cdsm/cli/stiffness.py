@@ -14,8 +14,7 @@ from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
+    from cdsm.loads import LoadsLike
     from cdsm.measures.holding import Holding
     from cdsm.measures.payload import Payload
     from cdsm.statics.buckling import CriticalLoad, CriticalTension
@@ -34,8 +33,8 @@ def show_stiffness(
     maximum: options.MaximumOption = math.inf,
     tension: options.TensionOption = None,
     pull: options.PullOption = None,
-    load: options.LoadOption = None,
-    mass: options.MassOption = None,
+    load: options.LoadsOption = None,
+    mass: options.MassesOption = None,
     direction: Annotated[str | None, opt("One more direction for it.", "AXIS|X,Y,Z")] = None,
     check: Annotated[
         bool, opt("Print a report: right, in balance, stable?", None, "--check")
@@ -57,7 +56,7 @@ def show_stiffness(
     from cdsm.support.format import stiffness_text
 
     robot = options.load_arm(arm, changes)
-    wrench = options.load_at_tip(robot, load, mass)
+    wrench = options.loads_on(robot, load, mass)
     K, rest = _balanced(robot, wrench, angles, minimum, maximum, tension, pull)
     friction = "followed along the path" if rest and rest.path else "ignored"
     head, numbers = header(K.posture, [] if rest else [minimum], friction, K.distribution)
@@ -102,7 +101,7 @@ def show_stiffness(
 
 def _balanced(
     arm: cdsm.Manipulator,
-    wrench: ArrayLike,
+    wrench: LoadsLike,
     angles: str | None,
     minimum: float,
     maximum: float,

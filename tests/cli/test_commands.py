@@ -100,6 +100,17 @@ def test_stiffness(probe: Path, pose: cdsm.Posture, tmp_path: Path) -> None:
     assert told("stiffness", probe, "--minimum", 5)["along_N_per_m"][0] is None  # infinite
 
 
+def test_stiffness_under_loads_on_links(probe: Path, pose: cdsm.Posture) -> None:
+    loads = ("--mass", "0.1@link1", "--load", "0,0.2,0@link1", "--load", "0,0,-0.3")
+    answer = told("stiffness", probe, "--angles", 8, "--minimum", 20, *loads)
+    W = np.array([*(0.1 * pose.arm.gravity + [0.0, 0.2, 0.0]), 0.0, 0.0, 0.0])
+    wrench = {"tool0": [0.0, 0.0, -0.3, 0.0, 0.0, 0.0], "link1": W}
+    tension = cdsm.distribute_tension(pose, 20.0, wrench=wrench)
+    K = cdsm.stiffness(pose, tension)
+    assert answer["loads"] == prepare_json(K.to_dict())["loads"]
+    assert answer["along_N_per_m"] == pytest.approx([K.along(u) for u in "xyz"])
+
+
 def test_stiffness_with_tolerances_and_friction(probe: Path, pose: cdsm.Posture) -> None:
     changes = ("--set", "tolerances.joint_angle=0.01", "--set", "friction=0.1")
     found = told("stiffness", probe, "--angles", 8, "--minimum", 30, *changes)

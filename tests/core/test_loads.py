@@ -317,7 +317,6 @@ def test_what_knows_only_a_wrench_at_the_tip_says_so() -> None:
     pose = universal().at(Q)
     hung = {"link2": [0.0, 0.0, -1.0, 0.0, 0.0, 0.0]}
     tension = cdsm.distribute_tension(pose, 10.0, wrench=hung)
-    K = cdsm.stiffness(pose, tension)
     assert "load on link2" in cdsm.to_mjcf(pose.arm, pose, tension)
     with pytest.raises(cdsm.InvalidInput, match="loads act on link2"):
         cdsm.uncertainty(pose, tension, cdsm.Tolerances(joint_angle=0.01), direction="z")
