@@ -230,6 +230,7 @@ def test_tensions_out_of_balance_are_a_fault_with_the_joint_and_the_torque() -> 
     K = cdsm.stiffness(pose, foreign.TENSION, wrench=(0, 0, 0, 0, 75, 0))
     assert pose.arm.joint_names[int(abs(K.residual).argmax())] == "f"
     assert (K.report().residual_joint, K.report().largest_residual) == ("a", abs(K.residual[0]))
+    assert f"(1 m counted as {1.0 / pose.arm.length:.4g} rad)" in str(K.report())
 
 
 def test_unstable_arm_fails() -> None:
