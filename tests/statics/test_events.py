@@ -78,7 +78,8 @@ def check_root(
     event: Event, pose: cdsm.Posture, tension: cdsm.Tension, force: Array, free: Array
 ) -> None:
     """The quantity that decides an event is zero there."""
-    rest = cdsm.equilibrium(pose, tension, np.append(event.share * force, np.zeros(3)))
+    # of two equilibria under this load, the one that slow loading reaches
+    rest = cdsm.weight_test(pose, tension, event.share * force).states[-1]
     arm = pose.arm
     if event.kind == "slack":
         c = arm.cables.names.index(event.place)
