@@ -31,6 +31,7 @@ from cdsm.stiffness_matrix.report import tables
 from cdsm.support.format import coordinates, place, span, without_rounding
 from cdsm.support.validation import unit_direction
 from cdsm.support.values import Array
+from cdsm.terms import as_loads
 from cdsm.tolerancing.budget import known_tolerances, uncertainty
 
 if TYPE_CHECKING:
@@ -171,10 +172,11 @@ def _picture(K: Stiffness) -> str:
     picture = _svg(
         lambda: plot_arm(K.posture, K.tension, K, warnings=False, title=""), "arm", words
     )
-    if not K.wrench.any():
+    W = K.tip_wrench  # loads on links are among the notes
+    if not W.any():
         return picture
-    force = f"force {coordinates(K.wrench[:3])} N"
-    moment = f", moment {coordinates(K.wrench[3:])} N m" if K.wrench[3:].any() else ""
+    force = f"force {coordinates(W[:3])} N"
+    moment = f", moment {coordinates(W[3:])} N m" if W[3:].any() else ""
     return picture + _paragraph(f"load at the tip: {force}{moment}", "soft")
 
 
@@ -258,7 +260,9 @@ def _compliance(K: Stiffness) -> str:
 def _python(K: Stiffness) -> str:
     """Return lines of Python that compute the stiffness again."""
     pose = K.posture
-    wrench = f", wrench={K.wrench.tolist()}" if K.wrench.any() else ""
+    wrench = f", wrench={K.tip_wrench.tolist()}" if K.tip_wrench.any() else ""
+    if as_loads(K.applied).on_links:
+        wrench = ", wrench=loads"  # those of the notes, at any point of a link
     pull = f"{K.tension.tolist()}{wrench}"
     if (tension := K.distribution) is not None and tension.least:
         low = _bound(tension.minimum)

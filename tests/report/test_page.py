@@ -138,6 +138,16 @@ def test_the_curve_of_an_arm_that_buckles_shows_where_it_would_hold() -> None:
     assert hatched.get_x() < 8.0 < panel.get_xlim()[1]
 
 
+def test_loads_on_links_are_in_the_page() -> None:
+    pose = arms.prototype(cdsm.LinearElasticity(48e3), 15.0)[0]
+    hung = [cdsm.Load("link2", force=(0.0, 0.0, -1.5))]
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 15.0, wrench=hung))
+    text = Reader(K.report().to_html()).text
+    assert "load on link2" in text
+    assert "-1.5) N" in text
+    assert "wrench=loads" in text
+
+
 def test_a_report_is_written_as_page_text_or_numbers(tmp_path: Path) -> None:
     report = REPORTS["NOT CHECKED"]
     text = report.write(tmp_path / "report.txt", "ARM.toml").read_text("utf-8")
