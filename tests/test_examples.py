@@ -79,10 +79,11 @@ def test_known_arms_are_read_and_name_their_source(name: str, q: list[float], ca
         assert cdsm.stiffness(pose, cdsm.distribute_tension(pose, 20.0 * (len(q) > 20))).is_stable
 
 
-@pytest.mark.parametrize(("name", "along_z"), [("backbone", 7.387), ("bending_links", 347.7e3)])
+@pytest.mark.parametrize(("name", "along_z"), [("backbone", 7.078), ("bending_links", 347.7e3)])
 def test_beams_hold_arms(name: str, along_z: float) -> None:
     arm = cdsm.Manipulator.read(EXAMPLES / f"{name}.toml").with_gravity((0.0, 0.0, 0.0))
     straight = arm.at(np.zeros(arm.nv))
     K = cdsm.stiffness(straight, cdsm.distribute_tension(straight))
+    # all tendons of the backbone are at 0 N: on one side one of them pulls
     assert K.along("z") == pytest.approx(along_z, rel=1e-3)
     assert "links that bend" in str(K)

@@ -126,20 +126,21 @@ def watched(arm: LockedArm, maximum: Array | None = None) -> Watched:
     )
     kinds: list[Kind] = [kind for kind, indices in cables_of for _ in indices]
     places = [names[c] for _, indices in cables_of for c in indices]
-    kinds += ["stop"] * (2 * len(joints))
-    places += [*joints, *joints]
+    # joints without limits have no stops
+    stops = np.flatnonzero(np.isfinite([arm.reference.arm.lower, arm.reference.arm.upper]))
+    kinds += ["stop"] * stops.size
+    places += [joints[i % len(joints)] for i in stops]
 
     def value(stage: Stage) -> Array:
         locked = stage.arm
         F = locked.continued_tensions(stage.pose)
-        gaps = stage.balance.gaps(stage.point.x).ravel()
+        gaps = stage.balance.gaps(stage.point.x).ravel()[stops]
         parts = F[stretched], (most - F)[limited], (F - low)[begun], (high - F)[ended], gaps
         return np.concatenate(parts)
 
     def scale(stage: Stage) -> Array:
         size = max(float(abs(stage.point.state.tension).max(initial=0.0)), 1e-300)
-        count = len(kinds) - 2 * len(joints)
-        return np.append(np.full(count, size), np.ones(2 * len(joints)))
+        return np.append(np.full(len(kinds) - stops.size, size), np.ones(stops.size))
 
     return Watched(tuple(kinds), tuple(places), value, scale)
 

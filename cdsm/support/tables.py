@@ -16,7 +16,7 @@ ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 """Units of angles in a header, in SI."""
 
 MEANINGFUL: Final = frozenset(
-    {"force", "moment", "mass", "load", "direction", "displacement", "test", "target"}
+    {"force", "moment", "mass", "load", "direction", "test", "target"}
     | {"tension", "pull", "minimum", "maximum"}
 )
 """Names of columns that change an answer: a file whose reader does not know one is refused."""

@@ -22,23 +22,25 @@ GEOMETRY = cdsm.Geometry.hinged(
     lead=0.3,
 )
 ANGLES = np.linspace(-0.5, 0.5, 8)
+BARELY = (1e-9, 1e-9)
+"""Tensions [N] under which cables are taut, but add nothing to the stiffness."""
 
 
 def hinge(softness: float = 2e-3, gravity: float = 9.81) -> cdsm.Manipulator:
-    """One hinge with slack cables of EA = 1/softness: its stiffness is A/softness + B·gravity."""
+    """One hinge with all but slack cables of EA = 1/softness: its stiffness is A/softness + B·gravity."""
     return cdsm.Manipulator(
         GEOMETRY, cdsm.LinearElasticity(1.0 / softness), gravity=(0.0, 0.0, -gravity)
     )
 
 
 def stiffnesses(arm: cdsm.Manipulator) -> Array:
-    along = [cdsm.stiffness(arm.at([q]), [0.0, 0.0]).along([0, 0, 1]) for q in ANGLES]
+    along = [cdsm.stiffness(arm.at([q]), BARELY).along([0, 0, 1]) for q in ANGLES]
     return np.array(along)
 
 
 def readings(noise: float) -> list[Measurement]:
     true, z = stiffnesses(hinge()), np.random.default_rng(0).normal(size=ANGLES.size)
-    pull: Any = {"direction": (0.0, 0.0, 1.0), "tension": (0.0, 0.0)}
+    pull: Any = {"direction": (0.0, 0.0, 1.0), "tension": BARELY}
     return [
         Measurement(value=K * (1.0 + noise * e), angles=(q,), std=noise * K, **pull)
         for K, e, q in np.c_[true, z, ANGLES].tolist()

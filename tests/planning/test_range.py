@@ -188,7 +188,9 @@ def test_stiffest_tensions_of_arms_that_their_least_tensions_do_not_hold(seed: i
     kind = str(rng.choice(["universal", "hinged"]))
     rng.uniform()
     arm = arms.random_arm(seed, int(rng.integers(2, 6)), kind, STRAND)
-    pose, u = arms.random_posture(arm, seed, 0.4), rng.normal(size=3)
+    joint, radius = arm.geometry.joints[0], arm.geometry.hole_radii[0]
+    reach = 0.4 * 2.0 * math.atan(joint.disk_offset / radius) / arm.upper[0]
+    pose, u = arms.random_posture(arm, seed, reach), rng.normal(size=3)
     low, high = float(rng.choice([10.0, 35.0])), float(rng.choice([200.0, 500.0]))
     found = cdsm.stiffness_range(pose, u, low, high)
     assert found.high >= known[seed] * (1.0 - 1e-4)

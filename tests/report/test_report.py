@@ -61,7 +61,7 @@ def test_right_stiffness_agrees_within_the_error_estimates(seed: int, reach: flo
 
 
 @settings(max_examples=3, deadline=None, derandomize=True)
-@given(seed=st.integers(0, 10_000).map(lambda seed: 3 * seed))  # with a moment
+@given(seed=st.integers(1, 10_000).map(lambda seed: 3 * seed))  # with a moment
 def test_every_wrong_term_is_found_and_named(seed: int) -> None:
     K = hybrid(seed)
     order = np.roll(np.arange(K.posture.arm.nv), 1)
