@@ -27,7 +27,7 @@ BARELY = (1e-9, 1e-9)
 
 
 def hinge(softness: float = 2e-3, gravity: float = 9.81) -> cdsm.Manipulator:
-    """One hinge with all but slack cables of EA = 1/softness: its stiffness is A/softness + B·gravity."""
+    """One hinge, its cables all but slack, EA = 1/softness: K is A/softness + B·gravity."""
     return cdsm.Manipulator(
         GEOMETRY, cdsm.LinearElasticity(1.0 / softness), gravity=(0.0, 0.0, -gravity)
     )
