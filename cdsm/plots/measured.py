@@ -183,9 +183,11 @@ def plot_uncertainty(
     bars = named | {"all together": budget.standard_uncertainty / size}
     axes = style.panel(ax, 0.9 + 0.2 * len(bars))
     colors = [style.COLORS[0]] * len(named) + [style.COLORS[1]]
-    drawn = axes.barh(list(bars), list(bars.values()), color=colors, height=0.65)
+    places = range(len(bars))
+    drawn = axes.barh(places, list(bars.values()), color=colors, height=0.65)
     for bar, source in zip(drawn, bars, strict=True):
         bar.set_gid(f"source:{source}")
+    axes.set_yticks(places, list(bars))
     axes.bar_label(drawn, fmt="%.3g", padding=3, fontsize=7)
     axes.invert_yaxis()
     axes.margins(x=0.3)  # for the numbers at the bars

@@ -148,6 +148,8 @@ def test_bars_of_a_budget_are_its_sources(budget: Any) -> None:
         if u:
             assert bars[f"source:{source.replace('_', ' ')}"].get_width() == pytest.approx(u / size)
     whole = bars["source:all together"].get_width()
+    labels = [f"source:{label.get_text()}" for label in ax.get_yticklabels()]
+    assert labels == [*bars]
     assert whole == pytest.approx(budget.standard_uncertainty / size)
     assert ax.get_xlabel() == f"standard uncertainty [{unit}]"
     require_look(ax)
