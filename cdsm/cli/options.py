@@ -272,7 +272,8 @@ def read_path(path: Path, arm: cdsm.Manipulator, *, target: bool = True) -> Moti
     units |= dict.fromkeys(followers, ANGLE | length) | dict.fromkeys("xyz", length)
     if target:
         units |= {"target": {"N/mm": 1e3, "N/m": 1.0}}
-    table = Columns(path, units, "samples", arm.cables.names)
+    # a closed loop writes the displacement of its samples
+    table = Columns(path, units, "samples", arm.cables.names, results=("displacement",))
 
     def column(name: str) -> Array:
         return np.array([table.number(row, name) for row in table.rows])

@@ -16,7 +16,7 @@ ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 """Units of angles in a header, in SI."""
 
 MEANINGFUL: Final = frozenset(
-    {"force", "moment", "mass", "load", "direction", "test", "target"}
+    {"force", "moment", "mass", "load", "direction", "displacement", "test", "target"}
     | {"tension", "pull", "minimum", "maximum"}
 )
 """Names of columns that change an answer: a file whose reader does not know one is refused."""
@@ -103,7 +103,8 @@ class Columns:
     Commas, semicolons or tabs separate them; commas are decimal marks if they do not. ``units`` has
     the units of each known column with their factors to SI; of a text, none. Other columns are
     ignored, unless they are almost called as a known one, hold angles of unknown joints, or have a
-    name of :data:`MEANINGFUL` or of ``refused``, which this reader does not read.
+    name of :data:`MEANINGFUL` or of ``refused``, which this reader does not read; those of
+    ``results`` are not read, since they came from what is read.
     Spreadsheets also write empty columns at the end, and empty rows: they do not count.
     ``holds`` says what the rows are. FileError names each fault, with its line and column.
     """
@@ -114,6 +115,7 @@ class Columns:
         units: Mapping[str, Mapping[str, float]],
         holds: str,
         refused: Iterable[str] = (),
+        results: Iterable[str] = (),
     ) -> None:
         table = read_table(path, ",;\t", rank=_cells_of_header)
         self.path = path
@@ -129,10 +131,11 @@ class Columns:
             if any(cells[width:]):
                 more = f"{len(cells)} cells, but the header {width}; write decimals with a point"
                 self.refuse(f"line {line}: has {more}")
+        unread = {*MEANINGFUL, *refused} - {*results}
         for at, (name, unit) in enumerate(map(name_and_unit, table.header)):
             if name in self:
                 self.refuse(f"has two columns called {name}; give each once")
-            if name not in units and name in {*MEANINGFUL, *refused}:
+            if name not in units and name in unread:
                 known = f"a file of {holds} has {listed([*units], 12)}"
                 self.refuse(
                     f"has a column {name}, which is not read: {known}. Rename it to keep it"

@@ -135,6 +135,10 @@ def test_columns_are_separated_as_spreadsheets_do(separator: str, tmp_path: Path
         ("x [mm],cable3_1 [mm],force [N]\n9,3,2\n", "needs both columns of a load"),
         ("x [mm],cable3_1 [mm],force [N],direction\n9,3,2,down\n", "'down' is no axis"),
         ("x [mm],cable3_1 [mm],moment [N m]\n9,3,2\n", "column moment, which is not read"),
+        (
+            "x [mm],cable3_1 [mm],displacement [mm]\n9,3,2\n",
+            "column displacement, which is not read",
+        ),
         ("x [mm],cable3_1 [mm],minimum [N]\n9,3,2\n", "column minimum, which is not read"),
     ],
 )
