@@ -158,6 +158,7 @@ def sweep_postures(
     from cdsm.support.status import status_names
     from cdsm.support.validation import XYZ
     from cdsm.sweeps.cases import DEFAULT
+    from cdsm.sweeps.entries import Entries
     from cdsm.sweeps.failing import explain_outside, explain_unstable
     from cdsm.sweeps.files import write_sweep
     from cdsm.sweeps.infeasible import explain_infeasible
@@ -222,9 +223,9 @@ def sweep_postures(
             count = (status == cause).sum(axis=0)
             least = cause == cdsm.Status.INFEASIBLE
             at = low.index(min(low)) if least else int(count.argmax())
-            entries_there = (robot, q.reshape(-1, robot.nv), status[:, at])
-            bounds = (low[at], maximum, wrench)
-            kind = explain(*entries_there, *bounds, worst_friction=worst_friction)
+            angles_there = q.reshape(-1, robot.nv)
+            load_there = (low[at], maximum, wrench, worst_friction)
+            kind = explain(Entries(robot, angles_there, status[:, at], *load_there))
             if kind is not None:
                 causes[f"{cause.word}_postures"] = kind.to_dict()
                 lines.append(f"{kind}" + f" (least tension {low[at]:g} N)" * (len(low) > 1))

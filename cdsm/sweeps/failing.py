@@ -5,22 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final, final
+from typing import final
 
-import numpy as np
-from numpy.typing import NDArray
-
-from cdsm.errors import CdsmError, listed
-from cdsm.manipulator import Manipulator
+from cdsm.errors import CdsmError
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
 from cdsm.stiffness_matrix.verdict import weakest_joint
 from cdsm.support.format import plural
 from cdsm.support.values import Array
-from cdsm.tension import distribute_tension
-
-_EXAMINED: Final = 64  # postures that are looked at one by one, some milliseconds each
+from cdsm.sweeps.entries import Entries, counted
 
 
 @final
@@ -60,7 +54,7 @@ class OutsidePostures:
         whole = plural(self.postures, "posture")
         lines = [f"tensions are outside the law of a cable at {self.count} of {whole}"]
         for passing in self.passing:
-            cables = _counted(passing.cables)
+            cables = counted(passing.cables)
             lines.append(f"  {passing.place}: {cables}{_examined(self)}, {passing.tension:.4g} N")
         return "\n".join(lines)
 
@@ -97,9 +91,9 @@ class UnstablePostures:
         whole = plural(self.postures, "posture")
         lines = [f"the arm buckles at {self.count} of {whole}"]
         if self.joints:
-            lines.append(f"  most moves {_counted(self.joints)}{_examined(self)}")
+            lines.append(f"  most moves {counted(self.joints)}{_examined(self)}")
         if self.slack:
-            lines.append(f"  only slack cables hold it: {_counted(self.slack)}{_examined(self)}")
+            lines.append(f"  only slack cables hold it: {counted(self.slack)}{_examined(self)}")
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, object]:
@@ -108,31 +102,17 @@ class UnstablePostures:
         return {name: getattr(self, name) for name in names}
 
 
-def explain_outside(
-    arm: Manipulator,
-    q: Array,
-    status: NDArray[np.int8],
-    minimum: float,
-    maximum: float,
-    wrench: Array,
-    *,
-    worst_friction: bool = False,
-) -> OutsidePostures | None:
-    """Find which cables of postures q (N, nv) leave their laws; None if none does.
-
-    ``status`` (N,) are those of the entries with these bounds [N] and this wrench (6,). Some of the
-    postures are examined, spread evenly.
-    """
-    rows = np.flatnonzero(status == Status.OUTSIDE_ELASTICITY)
-    if not rows.size:
+def explain_outside(entries: Entries) -> OutsidePostures | None:
+    """Find which cables leave their laws, of some of the postures; None if none does."""
+    count = entries.count(Status.OUTSIDE_ELASTICITY)
+    if not count:
         return None
     cables: dict[str, Counter[str]] = {}
     farthest: dict[str, float] = {}
-    chosen = spread(rows)
-    for row in chosen:
-        pose = arm.at(q[row])
+    sample = entries.sample(Status.OUTSIDE_ELASTICITY)
+    for pose in sample:
         try:
-            F = distribute_tension(pose, minimum, maximum, wrench, worst_friction=worst_friction)
+            F = entries.least_tension(pose)
         except CdsmError:
             continue
         for cable, place, tension, high in _passing(pose, F.values):
@@ -140,9 +120,9 @@ def explain_outside(
             extreme = max if high else min
             farthest[place] = extreme(farthest.get(place, tension), tension)
     return OutsidePostures(
-        count=len(rows),
-        postures=len(q),
-        examined=len(chosen),
+        count=count,
+        postures=len(entries.q),
+        examined=len(sample),
         passing=tuple(
             Passing(place=place, cables=dict(names.most_common()), tension=farthest[place])
             for place, names in cables.items()
@@ -165,52 +145,27 @@ def _passing(pose: Posture, F: Array) -> Iterator[tuple[str, str, float, bool]]:
             yield cable.name, "the series spring leaves no wire", tension, True
 
 
-def explain_unstable(
-    arm: Manipulator,
-    q: Array,
-    status: NDArray[np.int8],
-    minimum: float,
-    maximum: float,
-    wrench: Array,
-    *,
-    worst_friction: bool = False,
-) -> UnstablePostures | None:
-    """Find which joints buckle at postures q (N, nv); None if none does.
-
-    ``status`` (N,) are those of the entries with these bounds [N] and this wrench (6,). Some of the
-    postures are examined, spread evenly.
-    """
-    rows = np.flatnonzero(status == Status.UNSTABLE)
-    if not rows.size:
+def explain_unstable(entries: Entries) -> UnstablePostures | None:
+    """Find which joints buckle, at some of the postures; None if none does."""
+    count = entries.count(Status.UNSTABLE)
+    if not count:
         return None
     joints = Counter[str]()
     slack = Counter[str]()
-    chosen = spread(rows)
-    for row in chosen:
-        pose = arm.at(q[row])
-        F = distribute_tension(pose, minimum, maximum, wrench, worst_friction=worst_friction)
-        K = stiffness(pose, F)
+    sample = entries.sample(Status.UNSTABLE)
+    for pose in sample:
+        K = stiffness(pose, entries.least_tension(pose))
         if K.margin > 0.0:
             slack.update(K.slack)
         else:
             joints[weakest_joint(K)] += 1
     return UnstablePostures(
-        count=len(rows),
-        postures=len(q),
-        examined=len(chosen),
+        count=count,
+        postures=len(entries.q),
+        examined=len(sample),
         joints=dict(joints.most_common()),
         slack=dict(slack.most_common()),
     )
-
-
-def spread(rows: NDArray[np.intp]) -> list[int]:
-    """Return up to 64 of the ``rows``, spread evenly."""
-    chosen = rows[np.unique(np.linspace(0, len(rows) - 1, _EXAMINED).astype(int))]
-    return [int(row) for row in chosen]
-
-
-def _counted(names: dict[str, int]) -> str:
-    return listed([f"{name} ({count})" for name, count in names.items()])
 
 
 def _examined(postures: OutsidePostures | UnstablePostures) -> str:

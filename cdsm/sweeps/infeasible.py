@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.batch.distribution import distribute_tensions
-from cdsm.errors import CdsmError, InfeasibleTension, listed
+from cdsm.errors import CdsmError, InfeasibleTension
 from cdsm.manipulator import Manipulator
 from cdsm.status import Status
 from cdsm.support.format import place, plural
 from cdsm.support.values import Array
-from cdsm.sweeps.failing import spread
+from cdsm.sweeps.entries import Entries, counted
 from cdsm.sweeps.poses import RandomPoses, joint_angles
-from cdsm.tension import distribute_tension
 
 _BALANCED: Final = (
     *(Status.OK, Status.OUTSIDE_ELASTICITY, Status.SINGULAR),
@@ -68,14 +67,12 @@ class InfeasiblePostures:
     def __str__(self) -> str:
         lacking = f"{self.count} of {plural(self.postures, 'posture')} have no tensions within the "
         lines = [f"{lacking}bounds"]
-        counts = [f"{joint} ({count})" for joint, count in self.joints.items()]
-        if counts:
+        if self.joints:
             looked = f"of {self.examined} that were examined" if self.examined > 1 else "there"
-            lines.append(f"  most torque is missing at {listed(counts)}, {looked}")
+            lines.append(f"  most torque is missing at {counted(self.joints)}, {looked}")
         if self.widened:
             wider = f"  {self.widened} of {self.examined} have tensions within wider bounds; at a "
-            cables = [f"{cable} ({count})" for cable, count in self.cables.items()]
-            lines.append(f"{wider}bound then: {listed(cables)}")
+            lines.append(f"{wider}bound then: {counted(self.cables)}")
         names = self.arm.joint_names
         ends = [
             f"{names[j]} beyond {place(float(self.largest[j]), self.arm.joint_units[j])}"
@@ -93,38 +90,28 @@ class InfeasiblePostures:
     def to_dict(self) -> dict[str, object]:
         """Return what was found for JSON, angles in rad, ways in m."""
         names = ("postures", "examined", "joints", "widened", "cables", "limit", "share")
-        found = {name: getattr(self, name) for name in names}
+        numbers = {name: getattr(self, name) for name in names}
         largest = dict(zip(self.arm.joint_names, self.largest.tolist(), strict=True))
-        return {"infeasible": self.count, **found, "largest_balanced": largest}
+        return {"infeasible": self.count, **numbers, "largest_balanced": largest}
 
 
-def explain_infeasible(
-    arm: Manipulator,
-    q: Array,
-    status: NDArray[np.int8],
-    minimum: float,
-    maximum: float,
-    wrench: Array,
-    *,
-    worst_friction: bool = False,
-) -> InfeasiblePostures | None:
-    """Find why postures q (N, nv) have no tensions; None if all of them have.
+def explain_infeasible(entries: Entries) -> InfeasiblePostures | None:
+    """Find why postures have no tensions; None if all of them have.
 
-    ``status`` (N,) are those of the entries with these bounds [N] and this wrench (6,). Some of the
-    postures are examined, spread evenly; joint limits are tried at random postures.
+    Some of the postures are examined; joint limits are tried at random postures.
     """
-    rows = np.flatnonzero(status == Status.INFEASIBLE)
-    if not rows.size:
+    count = entries.count(Status.INFEASIBLE)
+    if not count:
         return None
+    arm = entries.arm
+    q = entries.q
     joints = Counter[str]()
     cables = Counter[str]()
     widened = 0
-    chosen = spread(rows)
-    for row in chosen:
+    sample = entries.sample(Status.INFEASIBLE)
+    for pose in sample:
         try:
-            distribute_tension(
-                arm.at(q[row]), minimum, maximum, wrench, worst_friction=worst_friction
-            )
+            entries.least_tension(pose)
         except InfeasibleTension as error:
             joints[error.joint] += 1
             if math.isfinite(error.relaxation):
@@ -132,18 +119,18 @@ def explain_infeasible(
                 cables.update(error.binding)
         except CdsmError:  # friction leaves no tensions within the bounds of a cable
             continue
-    balanced = np.isin(status, _BALANCED)
+    balanced = np.isin(entries.status, _BALANCED)
     largest = abs(q[balanced]).max(axis=0) if balanced.any() else np.full(arm.nv, np.nan)
     beyond = np.count_nonzero(abs(q) > largest + 1e-9, axis=0)
     limit = None
     share = 0.0
-    if len(rows) > (1.0 - _HELD) * len(q) and not worst_friction:
-        limit, share = _limit(arm, minimum, maximum, wrench)
+    if count > (1.0 - _HELD) * len(q) and not entries.worst_friction:
+        limit, share = _limit(entries)
     return InfeasiblePostures(
         arm=arm,
-        count=len(rows),
+        count=count,
         postures=len(q),
-        examined=len(chosen),
+        examined=len(sample),
         joints=dict(joints.most_common()),
         widened=widened,
         cables=dict(cables.most_common()),
@@ -154,13 +141,13 @@ def explain_infeasible(
     )
 
 
-def _limit(
-    arm: Manipulator, minimum: float, maximum: float, wrench: Array
-) -> tuple[float | None, float]:
+def _limit(entries: Entries) -> tuple[float | None, float]:
     """Return the largest limit [rad] within which nearly all random postures have tensions.
 
     With it comes their share. Joints that slide keep their limits.
     """
+    arm = entries.arm
+    bounds = (entries.minimum, entries.maximum, entries.wrench)
     turns = ~arm.slides
     widest = float(np.maximum(abs(arm.lower), abs(arm.upper)).max(where=turns, initial=0.0))
     nearest = float(np.maximum(arm.lower, -arm.upper).max(where=turns, initial=0.0))
@@ -173,7 +160,7 @@ def _limit(
     def share_within(limit: float) -> float:
         low = np.where(turns, np.maximum(lower, -limit), lower)
         high = np.where(turns, np.minimum(upper, limit), upper)
-        tensions = distribute_tensions(arm, low + unit * (high - low), minimum, maximum, wrench)
+        tensions = distribute_tensions(arm, low + unit * (high - low), *bounds)
         return float(np.mean(tensions.status == Status.OK))
 
     return _first_held(limits, share_within)

@@ -7,6 +7,7 @@ import pytest
 
 import cdsm
 from cdsm.stiffness_matrix.verdict import weakest_joint
+from cdsm.sweeps.entries import Entries
 from cdsm.sweeps.failing import explain_outside, explain_unstable
 from tests.cli.test_commands import call
 from tests.support.sweeps import short_arm
@@ -20,19 +21,19 @@ OUTSIDE = np.full(12, cdsm.Status.OUTSIDE_ELASTICITY, dtype=np.int8)
 def test_cables_below_and_above_their_law_and_without_wire_are_named() -> None:
     law = cdsm.presets.STRAND_1X19
     arm = short_arm(law)
-    low = explain_outside(arm, Q, OUTSIDE, 1.0, np.inf, NO_LOAD)
+    low = explain_outside(Entries(arm, Q, OUTSIDE, 1.0, np.inf, NO_LOAD))
     assert low is not None
     (below,) = (passing for passing in low.passing if passing.place.startswith("below"))
     assert f"{law.low:.4g} N" in below.place
     assert set(below.cables) <= {*arm.cables.names}
     assert below.tension == pytest.approx(1.0)
-    high = explain_outside(arm, Q, OUTSIDE, 1.01 * law.high, np.inf, NO_LOAD)
+    high = explain_outside(Entries(arm, Q, OUTSIDE, 1.01 * law.high, np.inf, NO_LOAD))
     assert high is not None
     (above,) = high.passing
     assert set(above.cables.values()) == {len(Q)}
     assert above.tension >= 1.01 * law.high
     assert f"above {law.high:.4g} N, where the law ends" in str(high)
-    springy = explain_outside(short_arm(spring=500.0), Q, OUTSIDE, 60.0, np.inf, NO_LOAD)
+    springy = explain_outside(Entries(short_arm(spring=500.0), Q, OUTSIDE, 60.0, np.inf, NO_LOAD))
     assert springy is not None
     assert "the series spring leaves no wire" in str(springy)
 
@@ -40,7 +41,7 @@ def test_cables_below_and_above_their_law_and_without_wire_are_named() -> None:
 def test_the_joint_that_moves_most_is_that_of_the_print() -> None:
     arm = short_arm(spring=8000.0, lead=0.3)
     rows = cdsm.sweep(arm, Q, minimum=100.0, outputs=["margin"])["status"].values
-    unstable = explain_unstable(arm, Q, rows, 100.0, np.inf, NO_LOAD)
+    unstable = explain_unstable(Entries(arm, Q, rows, 100.0, np.inf, NO_LOAD))
     assert unstable is not None
     assert unstable.count == np.count_nonzero(rows == cdsm.Status.UNSTABLE) == unstable.examined
     poses = [arm.at(q) for q in Q[rows == cdsm.Status.UNSTABLE]]
@@ -50,8 +51,8 @@ def test_the_joint_that_moves_most_is_that_of_the_print() -> None:
     assert unstable.joints == {joint: weakest.count(joint) for joint in unstable.joints}
     assert f"most moves {next(iter(unstable.joints))}" in str(unstable)
     fine = np.zeros(len(Q), dtype=np.int8)
-    assert explain_unstable(arm, Q, fine, 1.0, np.inf, NO_LOAD) is None
-    assert explain_outside(arm, Q, fine, 1.0, np.inf, NO_LOAD) is None
+    assert explain_unstable(Entries(arm, Q, fine, 1.0, np.inf, NO_LOAD)) is None
+    assert explain_outside(Entries(arm, Q, fine, 1.0, np.inf, NO_LOAD)) is None
 
 
 def test_the_command_says_which_cable_and_which_joint() -> None:

@@ -7,6 +7,7 @@ import pytest
 
 import cdsm
 from cdsm.batch.distribution import Tensions
+from cdsm.sweeps.entries import Entries
 from cdsm.sweeps.infeasible import InfeasiblePostures, explain_infeasible
 from cdsm.sweeps.poses import joint_angles
 from tests.cli.test_commands import call, told
@@ -19,7 +20,7 @@ NO_LOAD = np.zeros(6)
 def reasons(arm: cdsm.Manipulator, count: int) -> tuple[InfeasiblePostures | None, Tensions]:
     q = joint_angles(arm, cdsm.RandomPoses(count))
     tensions = cdsm.distribute_tensions(arm, q)
-    return explain_infeasible(arm, q, tensions.status, 0.0, np.inf, NO_LOAD), tensions
+    return explain_infeasible(Entries(arm, q, tensions.status, 0.0, np.inf, NO_LOAD)), tensions
 
 
 def test_every_statement_about_a_bent_snake_is_true() -> None:
