@@ -1,4 +1,4 @@
-"""Loads on any links of an arm, as a user gives them; :mod:`cdsm.terms` has their formulas."""
+"""Loads on any links of an arm, as a user gives them; :mod:`cdsm.applied` has their formulas."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.applied import Applied, LinkPoint, Loads, PointLoad, TipLoad
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import one_of, vector, wrench_vector
 from cdsm.support.values import Array, frozen
-from cdsm.terms import Applied, LinkPoint, Loads, PointLoad, TipLoad
 
 
 @final

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import qr
 
+from cdsm.applied import required_torque
 from cdsm.control.laws import (
     LAWS,
     ControlInput,
@@ -42,7 +43,6 @@ from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 from cdsm.tension.least_tensions import nearest_balanced
 from cdsm.tension.solvers import nondimensional
-from cdsm.terms import required_torque
 
 _MOST_STEPS: Final = 1000  # largest number of steps of control between two samples
 

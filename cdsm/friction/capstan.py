@@ -8,14 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.applied import Applied
 from cdsm.cable import Cable
 from cdsm.cable_laws import group_by_law
 from cdsm.posture import Posture
 from cdsm.routing import Indices
 from cdsm.stiffness_matrix import FrictionState, Stiffness, assemble
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, frozen, total
 from cdsm.tension import Tension
-from cdsm.terms import Applied, total
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wrapped_segments import STRAIGHT
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from cdsm.applied import LinkPoint, Loads, PointLoad, combined
 from cdsm.friction.capstan import ChainProblem, assemble_segments, can_stick
 from cdsm.loads import LoadsLike, link_point
 from cdsm.posture import Posture
@@ -23,7 +24,6 @@ from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import SMALLEST, Direction, unit_direction
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
-from cdsm.terms import LinkPoint, Loads, PointLoad, combined
 
 _NEVER: Final = 1e-12  # a hole never slides if its |x_i| − y_i is below this part of all |x_i|
 _STUCK: Final = 1e9  # ratio of tensions that no hole reaches

@@ -22,6 +22,7 @@ import numpy as np
 from lxml import etree
 from numpy.typing import ArrayLike
 
+from cdsm.applied import texts
 from cdsm.definition import refuse_terms
 from cdsm.errors import InvalidInput, warn
 from cdsm.interchange.mjcf_bodies import LEAST_INERTIA, add_bodies, couple
@@ -37,7 +38,6 @@ from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.validation import RANGES, instance, one_of, scalar
 from cdsm.support.values import Array
 from cdsm.tension import Tension
-from cdsm.terms import texts
 
 Actuators = Literal["length", "tension", "none"]
 

@@ -15,6 +15,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cdsm.applied import required_torque
 from cdsm.errors import CdsmError, InvalidInput, solver_failed
 from cdsm.posture import Posture
 from cdsm.status import Status
@@ -24,7 +25,6 @@ from cdsm.support.validation import NO_WRENCH, instance, wrench_vector
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import bounds_at, distribute_tension
 from cdsm.tension.solvers import Solution, maximise
-from cdsm.terms import required_torque
 
 _NO_MOTION = 1e-9
 """Smaller singular values of J_v, divided by the arm length, count as zero: no tip motion there."""

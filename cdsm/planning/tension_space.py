@@ -21,12 +21,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize
 
 from cdsm import readings
+from cdsm.applied import required_torque
 from cdsm.errors import ElasticityRangeError, InfeasibleTension, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.verdict import describe_buckling
 from cdsm.support.validation import SMALLEST, instance, wrench_vector
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, frozen, total
 from cdsm.tension import (
     Tension,
     advice,
@@ -37,7 +38,7 @@ from cdsm.tension import (
 )
 from cdsm.tension.least_tensions import nearest_balanced
 from cdsm.tension.solvers import nondimensional, without_warnings
-from cdsm.terms import CABLE_TERMS, required_torque, total
+from cdsm.terms import CABLE_TERMS
 
 MARGIN: Final = 1e-2
 """An arm counts as stable down to this part of the smallest eigenvalue of K_θ at the anchor."""

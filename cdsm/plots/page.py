@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 
+from cdsm.applied import as_loads
 from cdsm.errors import CdsmError, SingularStiffness
 from cdsm.planning.sensitivity import saturation
 from cdsm.plots import style
@@ -31,7 +32,6 @@ from cdsm.stiffness_matrix.report import tables
 from cdsm.support.format import coordinates, place, span, without_rounding
 from cdsm.support.validation import unit_direction
 from cdsm.support.values import Array
-from cdsm.terms import as_loads
 from cdsm.tolerancing.budget import known_tolerances, uncertainty
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ from scipy.differentiate import jacobian
 from scipy.linalg import null_space
 from scipy.optimize import nnls
 
+from cdsm.applied import as_loads, without_cables
 from cdsm.batch.evaluation import evaluate
 from cdsm.batch.rows import without_kernel
 from cdsm.definition import Term
@@ -22,7 +23,7 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.stiffness_matrix.report import Comparison, Verdict
 from cdsm.stiffness_matrix.verdict import TOLERANCE, imbalance_of
 from cdsm.support.values import Array
-from cdsm.terms import ConstantPull, Stretch, as_loads, torque_size, without_cables
+from cdsm.terms import ConstantPull, Stretch, torque_size
 
 _SMALL = 1e-3  # a term below this fraction of the whole is compared to this fraction of it
 _SAME = 1e-10  # K and the batch agree to this fraction of the largest entry of K_θ

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cdsm.applied import as_loads
 from cdsm.errors import CdsmError, SingularStiffness, listed
 from cdsm.friction.stick import breakaway
 from cdsm.report import checks
@@ -14,7 +15,6 @@ from cdsm.report.remedies import find_remedies
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Report, Stiffness
 from cdsm.stiffness_matrix.verdict import TOLERANCE, describe_buckling
-from cdsm.terms import as_loads
 
 
 def report_on(K: Stiffness) -> Report:

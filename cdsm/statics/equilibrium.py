@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cdsm.applied import Applied, Loaded, texts
 from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.loads import LoadsLike, loads_of
 from cdsm.posture import Posture
@@ -36,7 +37,6 @@ from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import Direction, instance, unit_direction
 from cdsm.support.values import Array, draw, frozen
 from cdsm.tension import Tension
-from cdsm.terms import Applied, texts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,7 +55,7 @@ _NEUTRAL = 1e-2  # smallest eigenvalue over the magnitudes of its terms: they ca
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Equilibrium(Result):
+class Equilibrium(Result, Loaded):
     """Equilibrium of an arm with locked motors under a load; made by :func:`~cdsm.equilibrium`.
 
     Joint limits act as stops. All arrays are read-only.
@@ -109,16 +109,6 @@ class Equilibrium(Result):
     def applied(self) -> Applied:
         """What acts: W (6,) at the tip, or loads on links."""
         return self.stiffness.applied
-
-    @property
-    def wrench(self) -> Array:
-        """W (6,) at ``tool0``, base axes; InvalidInput if loads act on other links."""
-        return self.stiffness.wrench
-
-    @quantity("N and N m", "component", name="wrench")
-    def tip_wrench(self) -> Array:
-        """W (6,) of what acts at ``tool0``, base axes: force [N], then moment [N m]."""
-        return self.stiffness.tip_wrench
 
     @quantity("torque", "joint")
     def residual(self) -> Array:

@@ -16,6 +16,7 @@ from typing import Final, Literal, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.applied import combined, scaled
 from cdsm.manipulator import Manipulator
 from cdsm.statics.continuation import (
     Model,
@@ -29,7 +30,6 @@ from cdsm.statics.continuation import (
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import Point
 from cdsm.support.values import Array
-from cdsm.terms import combined, scaled
 
 Kind = Literal["slack", "stop", "maximum", "law", "buckling"]
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.applied import Applied, acts, as_loads, scaled
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.loads import LoadsLike, loads_of
 from cdsm.manipulator import Manipulator
@@ -30,7 +31,6 @@ from cdsm.support.validation import (
     vector,
 )
 from cdsm.support.values import Array, frozen
-from cdsm.terms import Applied, acts, as_loads, scaled
 
 _HELD = 1e-9  # least stiffness of a joint without load, over the largest
 _FIRST = 1e-3  # share of the pull at which a path with friction begins: at 0 N no cable slides

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cdsm.applied import Applied, Loads, tip_part
 from cdsm.errors import InvalidInput
 from cdsm.friction.capstan import assemble_segments
 from cdsm.loads import loads_of
@@ -33,7 +34,6 @@ from cdsm.support.result import AXIS_NAMES, Result, data_frame, quantity, unit
 from cdsm.support.validation import WRENCH, instance, number_array, whole_number
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
-from cdsm.terms import Applied, Loads, tip_part
 
 WrenchesLike = ArrayLike | Mapping[str, ArrayLike] | Sequence[Applied]
 

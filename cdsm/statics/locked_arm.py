@@ -8,21 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.applied import Applied, without_cables
 from cdsm.errors import ElasticityRangeError
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.solve import ArmState
 from cdsm.stiffness_matrix import Stiffness, assemble
 from cdsm.support.values import Array, frozen
-from cdsm.terms import (
-    Applied,
-    ConstantPull,
-    Stretch,
-    stiffness_of,
-    torque_of,
-    torque_size_of,
-    without_cables,
-)
+from cdsm.terms import ConstantPull, Stretch, stiffness_of, torque_of, torque_size_of
 from cdsm.wires.elasticity import Elasticity, newton_in_bracket
 
 _ROUNDING = 1e-9  # a tension outside the domain of a law by at most this part is rounding

@@ -15,19 +15,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from cdsm.applied import Applied, between, without_cables
 from cdsm.friction.capstan import ChainProblem, ChainState, chain_tangent
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm, require_domain
 from cdsm.statics.solve import ArmState, Balance, Point, continued, settle
 from cdsm.support.values import Array, frozen
-from cdsm.terms import (
-    Applied,
-    between,
-    stiffness_of,
-    torque_of,
-    torque_size_of,
-    without_cables,
-)
+from cdsm.terms import stiffness_of, torque_of, torque_size_of
 
 EquilibriumPath = Mapping[float, Array]
 """Equilibria x (nv,) on the way to a load, as normal maps solve them, by the part of the way."""

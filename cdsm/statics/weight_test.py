@@ -10,6 +10,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.applied import Applied, LinkPoint, Loads, PointLoad, combined, scaled
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.loads import LoadsLike, link_point
@@ -26,7 +27,6 @@ from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import unit_direction, vector, whole_number
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
-from cdsm.terms import Applied, LinkPoint, Loads, PointLoad, combined, scaled
 
 SLIDING = 1.25  # an arm slides if its tangent is at most so many times the frictionless one
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.applied import Applied, without_cables
 from cdsm.definition import Term
 from cdsm.errors import InvalidInput
 from cdsm.loads import LoadsLike, loads_of
@@ -12,9 +13,9 @@ from cdsm.manipulator import ANOTHER_ARM
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix.value import Stiffness
 from cdsm.support.validation import NO_WRENCH, instance, vector
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, frozen, total
 from cdsm.tension import Tension
-from cdsm.terms import Applied, ConstantPull, Stretch, total, without_cables
+from cdsm.terms import ConstantPull, Stretch
 
 
 def stiffness(

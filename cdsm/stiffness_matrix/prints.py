@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdsm.applied import texts
 from cdsm.errors import SingularStiffness
 from cdsm.quantities import display_for
 from cdsm.stiffness_matrix.verdict import least_joint_stiffness
 from cdsm.support.format import MODEL, coordinates, key, largest_finite, span
 from cdsm.support.values import Array
-from cdsm.terms import texts
 
 if TYPE_CHECKING:
     from cdsm.manipulator import Manipulator

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm import readings
+from cdsm.applied import Applied, Loaded, described, required_torque
 from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.loads import link_point
 from cdsm.posture import Posture
@@ -36,7 +37,7 @@ from cdsm.support.result import Result, quantity, tabulated, unit_of
 from cdsm.support.validation import Direction, one_of, unit_direction, unit_directions
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
-from cdsm.terms import CABLE_TERMS, Applied, described, required_torque, tip_only, tip_part
+from cdsm.terms import CABLE_TERMS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +50,7 @@ _ORTHOGONAL = 1e-9  # largest product of two unit directions that are orthogonal
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Stiffness(Result):
+class Stiffness(Result, Loaded):
     """Joint stiffness and Cartesian stiffness (at ``tool0``, base axes) with all they depend on.
 
     K_θ is singular, and SingularStiffness raised, if the smallest singular value of D^-½ K_θ D^-½
@@ -87,16 +88,6 @@ class Stiffness(Result):
     friction: FrictionState = "frictionless"
     segment_tension: Array | None = None
     tension_gradient: Array | None = None
-
-    @property
-    def wrench(self) -> Array:
-        """W (6,) at ``tool0``, base axes; InvalidInput if loads act on other links."""
-        return tip_only(self.applied)
-
-    @quantity("N and N m", "component", name="wrench")
-    def tip_wrench(self) -> Array:
-        """W (6,) of what acts at ``tool0``, base axes: force [N], then moment [N m]."""
-        return tip_part(self.applied)
 
     @tabulated
     def active(self) -> Array:

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple, final
 
 import numpy as np
 
+from cdsm.applied import Applied, without_cables
 from cdsm.errors import listed
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.support.format import plural
 from cdsm.support.values import Array
-from cdsm.terms import Applied, ConstantPull, torque_size, without_cables
+from cdsm.terms import ConstantPull, torque_size
 
 if TYPE_CHECKING:
     from cdsm.manipulator import Manipulator

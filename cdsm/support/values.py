@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from importlib import import_module
 from typing import Any, ClassVar, Protocol, TypeVar
@@ -22,6 +22,16 @@ def frozen(array: _AnyArray) -> _AnyArray:
     """Make an array read-only, and return this array (not a copy)."""
     array.setflags(write=False)
     return array
+
+
+def total(parts: Sequence[Array]) -> Array:
+    """Compute the sum of arrays of one shape, in their order."""
+    if len(parts) == 1:
+        return parts[0]
+    result = parts[0] + parts[1]
+    for part in parts[2:]:
+        result += part  # in place, which is faster
+    return result
 
 
 class Converted(Protocol[_Accepted, _Kept]):

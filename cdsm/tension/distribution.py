@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
+from cdsm.applied import Applied, Loaded, required_torque
 from cdsm.cable import breaking_forces, largest_share
 from cdsm.errors import InvalidInput, solver_failed
 from cdsm.loads import LoadsLike, loads_of
@@ -23,7 +24,6 @@ from cdsm.tension.bounds import Bounds, bounds_at
 from cdsm.tension.infeasibility import infeasible
 from cdsm.tension.least_tensions import least_tensions
 from cdsm.tension.solvers import DEFAULT_SOLVER, OPTIMALITY, nondimensional
-from cdsm.terms import Applied, required_torque, tip_only, tip_part
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Tension(Result, IndexedByName):
+class Tension(Result, Loaded, IndexedByName):
     """Cable tensions that balance an arm, with the posture, load and bounds they were computed for.
 
     The keys are the names of the cables: ``tension["cable1_1"]`` [N], ``dict(tension)``. Use the
@@ -63,16 +63,6 @@ class Tension(Result, IndexedByName):
     maximum_held: Array = field(metadata=unit("N", "cable"))
     solver: str = field(metadata=unit("1"))
     least: bool = True
-
-    @property
-    def wrench(self) -> Array:
-        """W (6,) at ``tool0``, base axes; InvalidInput if loads act on other links."""
-        return tip_only(self.applied)
-
-    @quantity("N and N m", "component", name="wrench")
-    def tip_wrench(self) -> Array:
-        """W (6,) of what acts at ``tool0``, base axes: force [N], then moment [N m]."""
-        return tip_part(self.applied)
 
     @quantity("torque", "joint")
     def residual(self) -> Array:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.applied import as_loads, between, combined
 from cdsm.loads import loads_of
 from cdsm.support.values import Array
-from cdsm.terms import as_loads, between, combined
 
 SIZES = {
     "link_length": 0.06,
