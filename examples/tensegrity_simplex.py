@@ -13,6 +13,8 @@ shortened: inside it a cable pulls its head outwards and is as rigid as the stru
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 import cdsm
@@ -118,7 +120,8 @@ def _link(name: str, mass: float) -> str:
 
 def _joint(kind: str, parent: str, child: str, at: object, axis: object) -> str:
     xyz, unit = np.asarray(at), np.asarray(axis, dtype=float)
-    origin, along = (" ".join(map(repr, v.tolist())) for v in (xyz, unit / np.linalg.norm(unit)))
+    unit = unit / math.hypot(*unit)  # the norm of numpy has other last digits on other machines
+    origin, along = (" ".join(map(repr, v.tolist())) for v in (xyz, unit))
     return (
         f'<joint name="{child}_joint" type="{kind}">'
         f'<parent link="{parent}"/><child link="{child}"/>'

@@ -2,9 +2,9 @@
 
     python urdf/generate.py
 
-Two are the prototypes of the paper that cdsm implements, as its presets assume them. Four have the
-dimensions of models of CASPR (darwinlau/CASPR, BSD-3-Clause, commit a6971ee), one is a structure
-that was measured. A TOML keeps the comment at its head: where its numbers are from.
+Two are the prototypes of the paper that cdsm implements, with what is assumed of them. Four have
+the dimensions of models of CASPR (darwinlau/CASPR, BSD-3-Clause, commit a6971ee), one is a
+structure that was measured. A TOML keeps the comment at its head: where its numbers are from.
 """
 
 import math
@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import cdsm
-from cdsm import presets
+from cdsm import paper, presets
 
 FOLDER = Path(__file__).parent
 sys.path.insert(0, str(FOLDER.parent / "examples"))
@@ -180,8 +180,8 @@ BUILDERS = (sjtu_snake, carex, myo_shoulder, bm_arm, tensegrity_simplex.simplex)
 def files() -> dict[str, str]:
     """Return name and text of every file; a TOML keeps the comment at its head."""
     texts = {}
-    for paper in presets.virtual_prototype_geometry, presets.experimental_prototype_geometry:
-        geometry = paper()
+    for prototype in presets.virtual_prototype_geometry, paper.experimental_prototype_geometry:
+        geometry = prototype()
         texts[f"{geometry.name}.toml"] = geometry.to_toml()
         texts[f"{geometry.name}.urdf"] = cdsm.to_urdf(geometry)
     for build in BUILDERS:

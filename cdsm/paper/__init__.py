@@ -1,10 +1,18 @@
-"""Recompute the paper: simulations (Section IV, Figs. 3 to 8) and experiments (Section V)."""
+"""Recompute the paper: simulations (Section IV, Figs. 3 to 8) and experiments (Section V).
+
+The prototype of Section V is here too: the paper gives none of its dimensions.
+"""
 
 from collections.abc import Callable
 from typing import Final
 
 from cdsm.paper.claims import HEADER, Claim, Figure, to_dict, to_markdown, to_rows
 from cdsm.paper.experiments import ExperimentFigure, Trace, figure_10, figure_12, figure_13
+from cdsm.paper.prototype import (
+    experimental_prototype,
+    experimental_prototype_geometry,
+    fitted_prototype,
+)
 from cdsm.paper.simulation import (
     Curve,
     LeadFigure,
@@ -27,7 +35,8 @@ FIGURES: Final[dict[str, Callable[[], Figure]]] = {
 
 __all__ = [
     "FIGURES", "HEADER", "Claim", "Curve", "ExperimentFigure", "Figure", "LeadFigure",
-    "StiffnessFigure", "StrandFigure", "Trace", "law_of_stretched_length", "to_dict", "to_markdown",
-    "to_rows",
+    "StiffnessFigure", "StrandFigure", "Trace", "experimental_prototype",
+    "experimental_prototype_geometry", "fitted_prototype", "law_of_stretched_length", "to_dict",
+    "to_markdown", "to_rows",
 ]
 # fmt: on

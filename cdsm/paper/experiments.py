@@ -1,6 +1,6 @@
 """Recompute Figs. 10, 12 and 13 and Table II of Section V by virtual experiments.
 
-The prototype is unknown: :func:`cdsm.presets.fitted_prototype` was fitted to the numbers that these
+The prototype is unknown: :func:`cdsm.paper.fitted_prototype` was fitted to the numbers that these
 experiments gave in the paper. So agreement only shows that such a prototype is possible.
 Disagreement contradicts the model, an assumption or the other data.
 """
@@ -14,9 +14,9 @@ from typing import Final, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm import presets
 from cdsm.manipulator import Manipulator
 from cdsm.paper.claims import Claim, Figure, Statement, floats
+from cdsm.paper.prototype import fitted_prototype
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import XYZ
@@ -56,7 +56,7 @@ MEASURED = 131.0
 HYBRID: Final = 1890.0
 """Stiffness of the hybrid cables (strand and spring together) of Fig. 12 [N/m]."""
 
-# Conditions that the paper does not state, fitted with presets.fitted_prototype to its 20 numbers
+# Conditions that the paper does not state, fitted with fitted_prototype to its 20 numbers
 
 TENSION_OFFSET: Final = 17.3
 """Actual minus reported tension of the force-controlled cables [N]."""
@@ -138,7 +138,7 @@ def figure_10() -> ExperimentFigure:
     The curves stand beside Table II with x and y exchanged in rows 2 to 4 (evidence:
     :data:`TABLE_II_SWAPPED`). The claims compare the printed table too.
     """
-    arm = presets.fitted_prototype()
+    arm = fitted_prototype()
     tensions = frozen(np.linspace(TENSIONS[0], TENSIONS[-1], _POINTS))
     curves = measured(arm, POSTURE, tensions)
     computed = measured(arm, POSTURE, TENSIONS)
@@ -174,7 +174,7 @@ def figure_12() -> ExperimentFigure:
 
     Its claims have the accuracy check of Section V-B as well.
     """
-    arm = presets.fitted_prototype(HYBRID)
+    arm = fitted_prototype(HYBRID)
     tensions = np.linspace(TENSIONS[0], HIGHEST_TENSION, _POINTS)
     first, second = (measured(arm, q, tensions)[:, 1] for q in (POSTURE, SECOND_POSTURE))
     traces = _relative(tensions, [first, second], 1.0 - np.array(DROPS))
@@ -202,7 +202,7 @@ def figure_12() -> ExperimentFigure:
 def figure_13() -> ExperimentFigure:
     """Compute stiffness in y against cable stiffness for 2 configurations, at constant tension."""
     springs = np.linspace(HYBRID, STIFFEST, _POINTS)
-    arms = [presets.fitted_prototype(spring) for spring in springs.tolist()]
+    arms = [fitted_prototype(spring) for spring in springs.tolist()]
     curves = [
         np.array([measured(arm, q, [HYBRID_TENSION])[0, 1] for arm in arms])
         for q in (POSTURE, SECOND_POSTURE)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm import presets
+from cdsm import paper
 from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
 
 ARM = random_arm(1, 3)
@@ -46,7 +46,7 @@ def test_other_order_of_joints_permutes_everything() -> None:
 
 
 def test_experimental_prototype_controls_one_cable_of_each_pair_by_force() -> None:
-    arm = presets.experimental_prototype(series_stiffness=1890.0, tool_length=0.15)
+    arm = paper.experimental_prototype(series_stiffness=1890.0, tool_length=0.15)
     assert [cable.control for cable in arm.cables] == ["position", "force"] * 3
     assert {cable.series_stiffness for cable in arm.cables} == {1890.0}
     assert [link.length for link in arm.geometry.links] == [0.1, 0.1, 0.15]

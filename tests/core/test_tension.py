@@ -12,7 +12,7 @@ import pytest
 import qpsolvers
 
 import cdsm
-from cdsm import presets
+from cdsm import paper
 from cdsm.support.values import Array
 from tests.support.arms import STEEL, random_arm, random_posture, random_wrench, readme_geometry
 
@@ -110,7 +110,7 @@ def test_bounds_too_tight_say_what_is_missing_and_how_far_to_widen(seed: int) ->
 def test_advice_widens_the_bounds_of_cables_that_are_not_fixed(
     low: float, high: float, given: dict[str, float]
 ) -> None:
-    pose = presets.experimental_prototype().at(np.deg2rad([-12.0, -18.0, -20.0]))
+    pose = paper.experimental_prototype().at(np.deg2rad([-12.0, -18.0, -20.0]))
     # one unknown per joint is left, so the widening it needs is known: solve it independently
     J = pose.length_jacobian
     load = -pose.gravity_torque - J[1::2].T @ np.array(list(given.values()))
@@ -130,7 +130,7 @@ def test_advice_widens_the_bounds_of_cables_that_are_not_fixed(
 def test_no_widening_helps_where_the_fixed_tensions_alone_miss_the_balance(
     others: dict[str, float],
 ) -> None:
-    pose = presets.experimental_prototype().at(np.zeros(3))
+    pose = paper.experimental_prototype().at(np.zeros(3))
     # nothing but its own pair of cables reaches the last joint
     given = {"cable3_1": 20.0, "cable3_2": 60.0, **others}
     error = refused(pose, 5.0, 800.0, fixed=given)

@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 
 PRESETS: dict[str, Callable[[], cdsm.Geometry]] = {
     "virtual_prototype": cdsm.presets.virtual_prototype_geometry,
-    "experimental_prototype": cdsm.presets.experimental_prototype_geometry,
+    "experimental_prototype": cdsm.paper.experimental_prototype_geometry,
 }
 
 TAPER = (0.025, 0.022, 0.02)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm import presets
 from cdsm.paper import experiments
 from cdsm.paper.experiments import HYBRID, POSTURE, TENSION_OFFSET, measured
+from cdsm.paper.prototype import fitted_prototype
 from cdsm.support.values import Array
 from tests.conftest import Results
 
@@ -15,7 +15,7 @@ def test_table_2_and_the_prototype_are_the_papers() -> None:
     increments = experiments.TABLE_II[-1] / experiments.TABLE_II[0] - 1.0
     np.testing.assert_allclose(increments, (2.11, 3.6, 2.97), atol=0.015)  # as it prints them
     assert experiments.TENSIONS[[0, -1]].tolist() == [3.0, 86.0]
-    arm = presets.fitted_prototype()
+    arm = fitted_prototype()
     assert arm.nv == 3
     np.testing.assert_allclose(arm.upper, np.deg2rad(30.0))
     assert [cable.control for cable in arm.cables] == ["position", "force"] * 3
@@ -26,7 +26,7 @@ def test_table_2_and_the_prototype_are_the_papers() -> None:
 
 def test_measured_stiffness_is_a_central_difference_of_the_balance() -> None:
     """Hybrid cables: an exact spring, so that statics alone give the stiffness, without K_θ."""
-    arm = presets.fitted_prototype(HYBRID)
+    arm = fitted_prototype(HYBRID)
     pose = arm.at(POSTURE)
     (stiffness,) = measured(arm, POSTURE, [10.0])
     held = {c.name: 10.0 + TENSION_OFFSET for c in arm.cables if c.control == "force"}

@@ -76,7 +76,7 @@ def soft_arms() -> list[cdsm.Posture]:
     geometries = [
         mixed_arm().geometry,
         cdsm.presets.virtual_prototype_geometry(),
-        cdsm.presets.experimental_prototype_geometry(),
+        cdsm.paper.experimental_prototype_geometry(),
     ]
     poses = []
     for i, geometry in enumerate(geometries):
@@ -101,7 +101,7 @@ def test_margin_changes_its_sign_there_and_nowhere_below(pose: cdsm.Posture) -> 
 
 def test_strand_arm_stands_between_two_tensions() -> None:
     """Eq. 19 starts at a hundredth of its rigidity: too slack below, too much tension above."""
-    geometry = cdsm.presets.experimental_prototype_geometry(link_mass=0.6, lead=2.0)
+    geometry = cdsm.paper.experimental_prototype_geometry(link_mass=0.6, lead=2.0)
     arm = cdsm.Manipulator(geometry, cdsm.presets.STRAND_1X19, gravity=(-9.81, 0.0, 0.0))
     found = cdsm.critical_tension(arm.at(np.zeros(3)))
     ((low, high),) = found.stable
