@@ -10,11 +10,11 @@ import numpy as np
 from cdsm.cable import holes_like, require_own_cables, serpentine_cables
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.parameters import PARAMETERS, Kind, Parameter
+from cdsm.parameters import PARAMETERS, Parameter, PartKind
 from cdsm.support.validation import instance, one_of, scalar, text
 
-Place = tuple[Kind, int]
-"""Kind of a part of an arm, and its index among them."""
+Place = tuple[PartKind, int]
+"""PartKind of a part of an arm, and its index among them."""
 
 
 @final
@@ -107,7 +107,7 @@ class ArmParameters:
                 value is not a number. A spring is not positive.
         """
         parts = {kind: [*group] for kind, group in self._parts.items()}
-        changed = set[Kind]()
+        changed = set[PartKind]()
         for name, value in values.items():
             parameter = parameter_of(one_of("parameter", name, self.names))
             number = scalar(name, value)
@@ -123,7 +123,7 @@ class ArmParameters:
         parts[kind][i] = parameter_of(name).set(parts[kind][i], scalar(name, value))
         return self._built(parts, {kind})
 
-    def _built(self, parts: dict[Kind, list[Any]], changed: set[Kind]) -> Manipulator:
+    def _built(self, parts: dict[PartKind, list[Any]], changed: set[PartKind]) -> Manipulator:
         """Build the arm of these parts, of which those of some kinds are changed."""
         cables = parts["cables"]
         if changed <= {"cables"}:
@@ -141,9 +141,9 @@ class ArmParameters:
         return self.arm.with_geometry(geometry, cables)
 
     @property
-    def _parts(self) -> dict[Kind, tuple[Any, ...]]:
+    def _parts(self) -> dict[PartKind, tuple[Any, ...]]:
         """All parts of the arm by kind; each joint has a hole radius of its own."""
-        parts: dict[Kind, tuple[Any, ...]] = {"cables": self.arm.cables}
+        parts: dict[PartKind, tuple[Any, ...]] = {"cables": self.arm.cables}
         if self.arm.is_serpentine:
             geometry = self.arm.geometry
             joints = zip(geometry.joints, geometry.hole_radii, strict=True)
@@ -177,7 +177,7 @@ class ArmParameters:
             raise InvalidInput(name, f"{self.arm.name} has {lacks}.")
         return places
 
-    def _at(self, name: str, kind: Kind) -> list[int]:
+    def _at(self, name: str, kind: PartKind) -> list[int]:
         """Return the indices of the parts of a ``kind`` that stand where the name says."""
         _, at, where = name.partition("@")
         is_cable = kind in ("routes", "cables")

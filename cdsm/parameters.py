@@ -17,7 +17,7 @@ from cdsm.quantities import DISPLAY
 
 _Part = TypeVar("_Part")
 
-Kind = Literal["joints", "links", "routes", "cables"]
+PartKind = Literal["joints", "links", "routes", "cables"]
 """Parts of a geometry (joints, links, routes of cables), and the cables of an arm."""
 
 
@@ -77,7 +77,7 @@ class Parameter(Source):
         acts_under_load: Whether forces on an arm with locked motors show it.
     """
 
-    kinds: tuple[Kind, ...]
+    kinds: tuple[PartKind, ...]
     get: Callable[[Any], float | None]
     set: Callable[[Any, float], Any]
     shares: str | None = None
@@ -88,7 +88,7 @@ class Parameter(Source):
     acts_under_load: bool = True
 
 
-def attribute(kind: Kind, name: str, unit: Unit, **more: Any) -> Parameter:
+def attribute(kind: PartKind, name: str, unit: Unit, **more: Any) -> Parameter:
     """Return the parameter that is the attribute ``name`` of parts of a ``kind``."""
 
     def get(part: Any) -> float | None:

@@ -100,7 +100,7 @@ def slack_cables(tension: Array, cable_stiffness: Array) -> Mask:
     return np.asarray((tension <= SLACK * largest) & (cable_stiffness > 0.0))
 
 
-def without_cables(K: Array, J_L: Array, cable_stiffness: Array) -> Array:
+def remove_cables(K: Array, J_L: Array, cable_stiffness: Array) -> Array:
     """Compute K_θ − J_Lᵀ diag(k) J_L (..., n, n) for the stiffnesses k (..., C) of some cables."""
     return np.asarray(K - (_transposed(J_L) * cable_stiffness[..., None, :]) @ J_L)
 
@@ -139,7 +139,7 @@ def one_sided_along(
         The stiffness (N, D), inf where the tip cannot move; the motion x (N, D, n) per force; and
         where K_0 is not positive definite (N): there both are NaN.
     """
-    K_0 = without_cables(K, J_L, slack)
+    K_0 = remove_cables(K, J_L, slack)
     both = _scale(magnitudes)
     least = REGULAR * (magnitudes * both).max(axis=(-2, -1), initial=0.0)
     buckles = np.asarray(~(margin(K_0 * both) > least))
@@ -152,7 +152,7 @@ def one_sided_along(
         J = J_L[rows]
         k = slack[rows]
         assumed = pulls[rows, ways]
-        stiffness = without_cables(K_0[rows], J, np.where(assumed, -k, 0.0))
+        stiffness = remove_cables(K_0[rows], J, np.where(assumed, -k, 0.0))
         x = np.linalg.solve(stiffness, torque[rows, ways][..., None])
         change = (J @ x)[..., 0]
         counts = (k > 0.0) & (abs(change) > _ROUNDING * (abs(J) @ abs(x))[..., 0])

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm import readings
-from cdsm.batch.quantities import READINGS, TERMS, Codes, read
+from cdsm.batch.quantities import READINGS, Codes, read
 from cdsm.batch.rows import BodyArrays, PoseArrays, Rows, one_by_one, side_by_side, tables_of
+from cdsm.definition import TERMS_OF_K
 from cdsm.quantities import QUANTITIES
 from cdsm.readings import UNMOVED
 from cdsm.routing import SHORTEST_SEGMENT, Indices
@@ -198,7 +199,7 @@ class Chunk:
         terms = self._terms(by_all_joints, F, k, W)
         if self._rows.shifts is not None:
             terms[:, 0] += self._rows.shifts(self._one_by_one(F), self._part)
-        values = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
+        values = dict(zip(TERMS_OF_K, terms.swapaxes(0, 1), strict=False))
         values["joint"] = terms.sum(axis=1)
         if wanted:
             self._read(values, wanted, fine, terms[fine], values["joint"][fine], at)
@@ -244,7 +245,7 @@ class Chunk:
             self._kernels.COMPILED
             and self._table.coupling is None
             and self._rows.shifts is None
-            and self._names.isdisjoint(TERMS)
+            and self._names.isdisjoint(TERMS_OF_K)
             and wanted <= {"along"}
         )
 

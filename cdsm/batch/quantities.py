@@ -26,8 +26,6 @@ Codes = NDArray[np.uint8]
 READINGS: Final = ("margin", "pseudoinverse", "along", "compliance", "cartesian")
 """Quantities that :func:`read` computes."""
 
-TERMS: Final = ("active", "passive", "gravity", "load", "springs")
-
 
 def shapes_of(nv: int, cables: int, directions: int) -> dict[str, tuple[int, ...]]:
     """Return the shape of each quantity at one posture."""

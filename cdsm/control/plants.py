@@ -20,7 +20,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics import quasi_static
 from cdsm.statics.equilibrium import equilibrium
-from cdsm.statics.quasi_static import Load, QuasiStaticArm
+from cdsm.statics.quasi_static import Action, QuasiStaticArm
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.validation import checked_quantity, instance, scalar, whole_number
@@ -124,7 +124,7 @@ class QuasiStaticPlant:
         loading = state.loading
         taken_in = state.initial_paid_out - command.paid_out
         motors = np.where(loading.forced, command.tension, taken_in)
-        load = Load(wrench, np.zeros(self.arm.nv), motors)
+        load = Action(wrench, np.zeros(self.arm.nv), motors)
         moved, *_ = loading.step_to(state.state, load, self.substeps, "the step")
         return state._replace(state=moved)
 

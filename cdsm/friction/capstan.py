@@ -14,12 +14,10 @@ from cdsm.cable_laws import group_by_law
 from cdsm.posture import Posture
 from cdsm.routing import Indices
 from cdsm.stiffness_matrix import FrictionState, Stiffness, assemble
-from cdsm.support.values import Array, frozen, total
+from cdsm.support.values import Array, Flags, frozen, total
 from cdsm.tension import Tension
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wrapped_segments import STRAIGHT
-
-Flags = NDArray[np.bool_]
 
 _STEPS = 60  # most Newton steps: linear laws need one, strands 3 to 6
 _UNDAMPED = 20  # full Newton steps; later ones are shortened, since full ones may cycle at a kink

@@ -95,7 +95,7 @@ class StiffnessGradient(Result):
         along, motion = K.tip_response(u)
         loose = K.loose(motion)
         k = np.where(loose, K.cable_stiffness, 0.0)
-        taut = readings.without_cables(K.joint, K.posture.length_jacobian, k)
+        taut = readings.remove_cables(K.joint, K.posture.length_jacobian, k)
         slope = np.where(loose, 0.0, self.cable_stiffness)
         return frozen(self._through(u[None], np.array([[along]]), taut, slope)[:, 0, 0])
 

@@ -139,7 +139,7 @@ class TensionSpace:
         """
         J = self.pose.length_jacobian
         rows = self.directions @ self.pose.jacobian[:3]
-        K_0 = readings.without_cables(K, J, np.where(slack, k, 0.0))
+        K_0 = readings.remove_cables(K, J, np.where(slack, k, 0.0))
         values, vectors = np.linalg.eigh((K_0 + K_0.T) / 2.0)
         v = vectors[:, :1]
         softest = form_by_tension(self.pose, np.where(slack, 0.0, slope), v, v)[:, 0, 0]
@@ -156,7 +156,7 @@ class TensionSpace:
         for i, torque in enumerate(rows):
             # where the arm is not stable, which the searches avoid, all cables count
             loose = slack & (not buckles[0]) & readings.loose_cables(J, slack, motion[0, i])
-            taut = readings.without_cables(K, J, np.where(loose, k, 0.0))
+            taut = readings.remove_cables(K, J, np.where(loose, k, 0.0))
             right, left = (np.linalg.solve(A, torque[:, None]) for A in (taut, taut.T))
             along[i] = 1.0 / (torque @ right[:, 0])
             change = np.where(loose, 0.0, slope)
@@ -170,7 +170,7 @@ class TensionSpace:
         (K, k) = self._joint_stiffness(F)
         slack = readings.slack_cables(F, k)
         if slack.any():
-            K = readings.without_cables(K, self.pose.length_jacobian, np.where(slack, k, 0.0))
+            K = readings.remove_cables(K, self.pose.length_jacobian, np.where(slack, k, 0.0))
         return float(np.linalg.eigvalsh((K + K.T) / 2.0)[0]) / self.floor - 1.0
 
     def _joint_stiffness(self, F: Array) -> tuple[Array, Array]:

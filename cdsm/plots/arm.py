@@ -121,7 +121,7 @@ def plot_arm(
         lines = textwrap.wrap(warning, _CHARACTERS, max_lines=_NOTES, placeholder=" …")
         notes += [(line, style.VERMILLION) for line in lines]
     for line, (text, color) in enumerate(notes):
-        style.note(panel, text, line, color)
+        style.write_note(panel, text, line, color)
     return panel
 
 

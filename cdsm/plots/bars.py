@@ -47,7 +47,7 @@ def plot_shares(shares: Shares, ax: Axes | None = None, *, title: str | None = N
     panel.barh(cables, passive, _BAR, color=style.BLUE, label="passive: its elasticity")
     panel.barh(cables, active, _BAR, left=left, color=style.ORANGE, label="active: its tension")
     rest = N_PER_MM * np.array(list(others.values()))
-    colors = [style.TERMS.get(name, "0.5") for name in others]
+    colors = [style.TERM_COLORS.get(name, "0.5") for name in others]
     panel.barh(y[len(passive) :], rest, _BAR, color=colors)
     high = np.append(np.maximum(passive, 0.0) + np.maximum(active, 0.0), np.maximum(rest, 0.0))
     low = np.append(np.minimum(passive, 0.0) + np.minimum(active, 0.0), np.minimum(rest, 0.0))

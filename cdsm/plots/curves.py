@@ -125,7 +125,7 @@ def plot_stiffness_over_tension(
     shown = [along]
     for term, values in parts.items():
         if terms and np.nanmax(abs(values)) > _SMALL * most:
-            color = style.TERMS.get(term, "0.5")
+            color = style.TERM_COLORS.get(term, "0.5")
             panel.plot(x, values, color=color, lw=0.9, gid=f"term:{term}")
             ends.append((float(values[last]), term, color))
             shown.append(values)

@@ -91,7 +91,7 @@ def plot_path(
     if colors is not None:
         style.color_bar_beside(panel, colors, "N")
     count = f"the last of {len(poses)} postures, others pale"
-    style.note(panel, f"{count}; red: way of the tip", color=style.SOFT)
+    style.write_note(panel, f"{count}; red: way of the tip", color=style.SOFT)
     style.set_title(panel, title, f"{poses[0].arm.name}: which way does it go?")
     if animate is not None:
         _write_film(animate, poses, values, view)
@@ -207,7 +207,7 @@ def plot_force_polytope(
     panel.plot(*worst[0], "+", color=style.BLACK, ms=7, zorder=5, gid="no load")
     drawing.finish("N", fit=ax is None)
     words = f"red: {polytope.radius:.4g} N in the worst direction; cross: no load"
-    style.note(panel, words, color=style.VERMILLION)
+    style.write_note(panel, words, color=style.VERMILLION)
     style.set_title(panel, title, f"{polytope.posture.arm.name}: which forces can its tip bear?")
     return panel
 

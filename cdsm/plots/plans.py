@@ -71,7 +71,7 @@ def plot_stiffness_ranges(
         radius = N_PER_MM * np.array(values)[np.argsort(half)]
         return np.append(turn, [*(turn + np.pi), turn[0]]), np.append(radius, [*radius, radius[0]])
 
-    shades = style.TENSIONS(np.linspace(0.0, 1.0, len(ranges)))
+    shades = style.TENSION_COLORS(np.linspace(0.0, 1.0, len(ranges)))
     for k, (label, row) in enumerate(ranges.items()):
         high = around(row, [attainable.high for attainable in row])
         look: dict[str, Any] = {"color": shades[k], "ls": style.STYLES[k % 4]}

@@ -47,7 +47,7 @@ BLACK: Final = "#000000"
 COLORS: Final = (BLUE, VERMILLION, GREEN, ORANGE, SKY, PURPLE, BLACK)
 """Colours of Okabe and Ito, "Color universal design", 2008; the first three are x, y and z."""
 
-TERMS: Final = {
+TERM_COLORS: Final = {
     "passive": BLUE,
     "active": ORANGE,
     "gravity": GREEN,
@@ -69,7 +69,7 @@ DARK: Final = {
 
 STYLES: Final = ("-", "--", "-.", ":")
 COLOR_MAP: Final = "viridis"
-TENSIONS: Final = ListedColormap(colormaps[COLOR_MAP](np.linspace(0.0, 0.9, 256)), "tensions")
+TENSION_COLORS: Final = ListedColormap(colormaps[COLOR_MAP](np.linspace(0.0, 0.9, 256)), "tensions")
 """Colours of tensions: without the yellow end, which is not seen in a thin line on white."""
 
 MM: Final = 1e3
@@ -217,7 +217,7 @@ def set_heading(axs: Panels, axs_of_caller: object, title: str | None, question:
         set_title(axs[0], title, "")
 
 
-def note(ax: Axes, text: str, line: int = 0, color: str = INK, below: float = 3.0) -> None:
+def write_note(ax: Axes, text: str, line: int = 0, color: str = INK, below: float = 3.0) -> None:
     """Write a line of small text below axes that have no ticks."""
     place = (0.0, -below - 9.5 * line)
     options: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
@@ -247,7 +247,7 @@ def tension_colors(tensions: Array, limits: tuple[float, float] | None = None) -
     if high - low <= 1e-9 * abs(high):
         low = 0.95 * low - 1e-9
         high = 1.05 * high + 1e-9
-    return ScalarMappable(Normalize(float(low), float(high)), TENSIONS)
+    return ScalarMappable(Normalize(float(low), float(high)), TENSION_COLORS)
 
 
 def slack_below(tensions: Array) -> float:
@@ -361,7 +361,7 @@ def name_lines(ax: Axes, x: float, ends: Sequence[tuple[float, str, str]]) -> No
 def line_looks(names: Sequence[str]) -> list[dict[str, Any]]:
     """Return colour and style of a line for each name; above 28 names, a colour only."""
     if len(names) > len(COLORS) * len(STYLES):
-        return [{"color": color} for color in TENSIONS(np.linspace(0.0, 1.0, len(names)))]
+        return [{"color": color} for color in TENSION_COLORS(np.linspace(0.0, 1.0, len(names)))]
     color = COLORS * 4
     style = [line_style for line_style in STYLES for _ in COLORS]
     return [{"color": color[i], "ls": style[i]} for i in range(len(names))]

@@ -20,7 +20,7 @@ from cdsm.batch.rows import without_kernel
 from cdsm.definition import Term
 from cdsm.errors import CdsmError, listed
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.stiffness_matrix.report import Comparison, Verdict
+from cdsm.stiffness_matrix.report import Agreement, Comparison
 from cdsm.stiffness_matrix.verdict import TOLERANCE, imbalance_of
 from cdsm.support.values import Array
 from cdsm.terms import ConstantPull, Stretch, torque_size
@@ -130,7 +130,7 @@ def _compare(
     if not reason and most < off <= 3.0 * bound:
         reason = "the finite differences do not converge"
     unit = "N m" if name.endswith("torque") else "N m/rad"
-    verdict: Verdict = "not possible" if reason else "agrees" if off <= most else "DIFFERS"
+    verdict: Agreement = "not possible" if reason else "agrees" if off <= most else "DIFFERS"
     return Comparison(name, unit, float(abs(matrix).max()), off, bound, verdict, reason)
 
 

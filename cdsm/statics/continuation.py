@@ -11,13 +11,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cdsm.errors import CdsmError
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import FAR, Balance, Point, continued, least_eigenvalue, stable_between
-from cdsm.support.values import Array
+from cdsm.support.values import Array, Flags
 
 _FINEST = 2.0**-12  # relative precision of the last share of the search; below 1e-9, absolute
 _RATE = 1e-6  # change of the share for a difference
@@ -27,7 +26,6 @@ _CONVERGED = 1e-12  # largest |f| along the arc, over its scale
 
 _LOST = CdsmError("the branch of equilibria cannot be followed to its end.")
 
-Flags = NDArray[np.bool_]
 
 Model = Callable[[float], LockedArm]
 """Arm under a share of the load and of the pull."""
@@ -91,14 +89,14 @@ def rate(model: Model, stage: Stage) -> Array:
     return np.asarray(-np.linalg.lstsq(stage.point.slope, change)[0], np.float64)
 
 
-class End(NamedTuple):
+class BranchEnd(NamedTuple):
     """Where a branch loses its stability."""
 
     stage: Stage
     slack: tuple[tuple[int, float], ...]  # cables that go slack on the way there, and the shares
 
 
-def end_of_branch(model: Model, last: Stage) -> End | None:
+def end_of_branch(model: Model, last: Stage) -> BranchEnd | None:
     """Find where the branch beyond ``last`` loses its stability.
 
     The smallest eigenvalue of K_θ is 0 there, or falls below 0 as a cable goes slack. Returns None
@@ -117,7 +115,7 @@ def end_of_branch(model: Model, last: Stage) -> End | None:
             taut = taut & (np.arange(taut.size) != cable)
         after = _held(model(stage.share), taut, stage)
         if cable is None or least_eigenvalue(after.balance, after.point) <= 0.0:
-            return End(after, tuple(slack))
+            return BranchEnd(after, tuple(slack))
         here = after
     return None
 

@@ -17,7 +17,7 @@ from cdsm.posture import Posture
 from cdsm.statics.continuation import Model, follow, stage_at
 from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, settled, with_forced
 from cdsm.statics.events import events_on, watched
-from cdsm.statics.load_cycle import Goal, approach
+from cdsm.statics.load_cycle import Approach, approach
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.quasi_static import QuasiStaticArm
 from cdsm.stiffness_matrix import checked_tension
@@ -147,8 +147,8 @@ def _with_friction(model: Model, home: Posture, wrench: Applied) -> Equilibrium:
         taken = wire - loaded.rest_length
         straight = pose.arm.laws.original_lengths(pose.cable_lengths, F)
         more = np.where(F == 0.0, np.maximum(wire - straight, 0.0), 0.0)
-    goals = [Goal(none, taken, _PULL_STEPS, "the pull")]
-    goals += [Goal(wrench, taken, _LOAD_STEPS, "the load")] if acts(wrench) else []
+    goals = [Approach(none, taken, _PULL_STEPS, "the pull")]
+    goals += [Approach(wrench, taken, _LOAD_STEPS, "the load")] if acts(wrench) else []
     arm = QuasiStaticArm(pose, F)
     path, _ = approach(arm, arm.initial(none, more), goals)
     rest = home.arm.at(path.angles[-1], check_limits=False)

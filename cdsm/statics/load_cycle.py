@@ -21,8 +21,8 @@ from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
 from cdsm.statics.quasi_static import (
     NO_PATH,
+    Action,
     EquilibriumPath,
-    Load,
     QuasiStaticArm,
     QuasiStaticState,
 )
@@ -284,7 +284,7 @@ def follow_loads(
         wire = np.add.reduceat(state.arm_state.chain.rest_length, arm.start[:-1])
         commands = _commands(motors, pose, commands.shape, wire)
     goals = [
-        Goal(wrench, command, substeps, f"the step to load {k}")
+        Approach(wrench, command, substeps, f"the step to load {k}")
         for k, (wrench, command) in enumerate(zip(loads, commands, strict=True))
     ]
     return approach(arm, state, goals, near)
@@ -317,7 +317,7 @@ def _rows(name: str, wrenches: ArrayLike) -> Array:
     return rows
 
 
-class Goal(NamedTuple):
+class Approach(NamedTuple):
     """A load, and how it is approached."""
 
     wrench: Applied  # W (6,): force [N], then moment [N m]; or loads on links
@@ -329,7 +329,7 @@ class Goal(NamedTuple):
 def approach(
     arm: QuasiStaticArm,
     start: QuasiStaticState,
-    goals: Sequence[Goal],
+    goals: Sequence[Approach],
     near: Sequence[EquilibriumPath] = (),
 ) -> tuple[LoadHistory, tuple[EquilibriumPath, ...]]:
     """Load an arm slowly from one goal to the next, from a state at its reference.
@@ -342,7 +342,7 @@ def approach(
     steps = []
     state = start
     for k, goal in enumerate(show_progress(goals, "loads")):
-        load = Load(goal.wrench, none, goal.motors)
+        load = Action(goal.wrench, none, goal.motors)
         known = near[k] if near else NO_PATH
         state, step = arm.step_to(state, load, goal.substeps, goal.what, known)
         states.append(state)

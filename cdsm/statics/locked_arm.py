@@ -21,7 +21,7 @@ from cdsm.wires.elasticity import Elasticity, newton_in_bracket
 _ROUNDING = 1e-9  # a tension outside the domain of a law by at most this part is rounding
 _HUGE = 1e12  # no tension [N] is beyond
 
-Indices = slice | NDArray[np.intp]
+Selection = slice | NDArray[np.intp]
 
 
 class LockedArm:
@@ -133,7 +133,7 @@ class _LockedLaw(NamedTuple):
     """The n position-controlled cables with one law, in their order; arrays are (n,)."""
 
     law: Elasticity
-    cables: Indices
+    cables: Selection
     rest_length: Array  # [m]
     series: Array  # compliance of the springs [m/N]
     start: Array  # a tension F_0 [N]
@@ -161,7 +161,7 @@ class _LockedLaw(NamedTuple):
 
 
 def require_domain(
-    arm: Manipulator, law: Elasticity, cables: Indices, tension: Array, where: str = ""
+    arm: Manipulator, law: Elasticity, cables: Selection, tension: Array, where: str = ""
 ) -> None:
     """Raise ElasticityRangeError if the tensions F [N] of the cables ``of`` are outside their law.
 

@@ -30,18 +30,18 @@ NO_PATH: Final[EquilibriumPath] = {}
 _SHORTEST = 2.0**-8  # shortest sub-step, as a part of the step between two loads
 
 
-class Load(NamedTuple):
+class Action(NamedTuple):
     """Load and motor commands that act on an arm."""
 
     wrench: Applied  # W (6,): force [N], then moment [N m]; or loads on links
     holding: Array  # torque that holds an unbalanced arm at its reference (nv,) [N m]
     motors: Array  # per cable (C,): rest length taken in [m]; or tension [N] of a force motor
 
-    def interpolate(self, other: Load, part: float) -> Load:
+    def interpolate(self, other: Action, part: float) -> Action:
         """Return the load at the part ``part`` (0 to 1) of the straight way to ``other``."""
         holding = self.holding + part * (other.holding - self.holding)
         motors = self.motors + part * (other.motors - self.motors)
-        return Load(between(self.wrench, other.wrench, part), holding, motors)
+        return Action(between(self.wrench, other.wrench, part), holding, motors)
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class ChainArmState(ArmState):
 class QuasiStaticState(NamedTuple):
     """Equilibrium of an arm under a load."""
 
-    load: Load
+    load: Action
     arm_state: ChainArmState
     x: Array  # solution of the normal map (nv,)
     stop_torque: Array  # torque of the stops (nv,) [N m]
@@ -101,14 +101,14 @@ class QuasiStaticArm:
         none = np.zeros(pose.q.size)
         rest_length = np.array(self._problem.rest_lengths(pose.segments.lengths, T))
         rest_length[self.start[:-1]] += slack
-        state = self._state(pose, rest_length, Load(wrench, none, motors), T)
+        state = self._state(pose, rest_length, Action(wrench, none, motors), T)
         x = pose.q / Balance(lambda q: state, pose, state).unit
-        return QuasiStaticState(Load(wrench, state.residual, motors), state, x, frozen(none))
+        return QuasiStaticState(Action(wrench, state.residual, motors), state, x, frozen(none))
 
     def step_to(
         self,
         before: QuasiStaticState,
-        load: Load,
+        load: Action,
         substeps: int,
         what: str,
         near: EquilibriumPath = NO_PATH,
@@ -161,7 +161,7 @@ class QuasiStaticArm:
         self._require_domains(state.arm_state.tension, what)
         return state, Step(slip, dissipated, snapped, path)
 
-    def _balance(self, before: QuasiStaticState, load: Load) -> Balance:
+    def _balance(self, before: QuasiStaticState, load: Action) -> Balance:
         """Return the normal map of the states that follow ``before`` under a load."""
         old = before.arm_state
         rest_length = before.arm_state.chain.rest_length.copy()
@@ -174,7 +174,7 @@ class QuasiStaticArm:
 
         return Balance(at, self.reference, old, load.holding)
 
-    def _state(self, pose: Posture, rest_length: Array, load: Load, near: Array) -> ChainArmState:
+    def _state(self, pose: Posture, rest_length: Array, load: Action, near: Array) -> ChainArmState:
         """Compute the state at a posture; the search for tensions starts at ``near`` (S,) [N]."""
         segments = pose.segments
         terms = without_cables(pose, load.wrench)

@@ -30,7 +30,7 @@ _OUTCOMES: Final[dict[Outcome, str]] = {
     "FAIL": "do not use this stiffness as it is.",
 }
 
-Verdict = Literal["agrees", "DIFFERS", "not possible"]
+Agreement = Literal["agrees", "DIFFERS", "not possible"]
 
 
 @final
@@ -54,7 +54,7 @@ class Comparison:
     largest: float
     off: float
     error: float
-    verdict: Verdict
+    verdict: Agreement
     reason: str
 
 

@@ -168,7 +168,7 @@ class Stiffness(Result, Loaded):
     def without_slack(self) -> Array:
         """K_θ without the stiffness of the cables at 0 N (nv, nv) [N m/rad]."""
         k = np.where(self._slack, self.cable_stiffness, 0.0)
-        return frozen(readings.without_cables(self.joint, self.posture.length_jacobian, k))
+        return frozen(readings.remove_cables(self.joint, self.posture.length_jacobian, k))
 
     @property
     def margin_without_slack(self) -> float:

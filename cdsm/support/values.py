@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 _AnyArray = TypeVar("_AnyArray", bound=NDArray[Any])
 _Accepted = TypeVar("_Accepted", contravariant=True)

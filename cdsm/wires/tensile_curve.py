@@ -27,7 +27,7 @@ _FEWEST_NEAR = 20  # fewest points of such an average
 _ROUGHER = 100.0  # smoothing of the fit over that of the curve for the band
 
 
-class Curve(NamedTuple):
+class FittedCurve(NamedTuple):
     """The fitted curve on a grid of g tensions."""
 
     tension: Array  # (g,) [N]
@@ -69,7 +69,7 @@ def _local_squares(error: Array, strain: Array) -> Array:
     return squares
 
 
-def fit_curve(strain: Array, force: Array, noise: float, resolution: float = 0.0) -> Curve:
+def fit_curve(strain: Array, force: Array, noise: float, resolution: float = 0.0) -> FittedCurve:
     """Fit a curve to points with ``noise`` [N] in their forces, and choose its smoothing.
 
     Steps of a load cell of this ``resolution`` [N] may drift along a ramp, and look like bends of
@@ -173,4 +173,4 @@ def fit_curve(strain: Array, force: Array, noise: float, resolution: float = 0.0
     if np.std(r) < max(1e-4 * reach, resolution / 2.0):  # what is left is no noise
         correlation = 0.0
     level = splines @ rough[:-1]
-    return Curve(tension, grid, np.log(EA), level, np.sqrt(variance + bias**2), correlation)
+    return FittedCurve(tension, grid, np.log(EA), level, np.sqrt(variance + bias**2), correlation)

@@ -15,7 +15,7 @@ from cdsm.support.values import Array, Plotted, frozen
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import TabulatedElasticity
 from cdsm.wires.tensile_branch import FEWEST, loading, refuse
-from cdsm.wires.tensile_curve import Curve, fit_curve
+from cdsm.wires.tensile_curve import FittedCurve, fit_curve
 from cdsm.wires.tensile_test import TensileTest
 
 _NORMAL: Final = 1.959963984540054  # quantile of the normal distribution for 95 %
@@ -27,7 +27,7 @@ _LEAST: Final = 1e3  # EA [N] below which a law is doubted, as of LinearElastici
 _CERTAIN: Final = 3.0  # standard deviations
 
 
-class Stage(NamedTuple):
+class TestStage(NamedTuple):
     """Stage of a tensile test: ``pre-tensioning``, ``elastic`` or ``plastic``."""
 
     name: str
@@ -72,7 +72,7 @@ class TensileFit(Result, Plotted):
     """
 
     elasticity: Elasticity
-    stages: tuple[Stage, ...]
+    stages: tuple[TestStage, ...]
     band: Band
     rms: float = field(metadata=unit("N"))
     start: float = field(metadata=unit("m"))
@@ -218,9 +218,9 @@ def fit_tensile_test(
     low = float(grid[0])
     high = float(grid[-1])
     begin = _pretension_end(curve)
-    stages = [Stage("elastic", low if begin is None else begin, high)]
-    stages[:0] = [] if begin is None else [Stage("pre-tensioning", low, begin)]
-    stages += [] if onset is None else [Stage("plastic", high, max(most, high))]
+    stages = [TestStage("elastic", low if begin is None else begin, high)]
+    stages[:0] = [] if begin is None else [TestStage("pre-tensioning", low, begin)]
+    stages += [] if onset is None else [TestStage("plastic", high, max(most, high))]
     middle, deviation = (np.interp(grid, curve.tension, a) for a in (curve.rough, curve.deviation))
     half = np.maximum(_NORMAL * deviation, _EXACT)
     level = np.log(law.rigidity(grid))
@@ -247,7 +247,7 @@ def _doubts(rigidity: float) -> tuple[str, ...]:
     )
 
 
-def _as_law(curve: Curve, strain: Array) -> tuple[Array, TabulatedElasticity]:
+def _as_law(curve: FittedCurve, strain: Array) -> tuple[Array, TabulatedElasticity]:
     """Return about 200 tensions [N] over the strains (n,) that were fitted, and the law there."""
     low, high = np.interp([strain.min(), strain.max()], curve.strain, curve.tension)
     low = low if low > 1e-6 * high else 0.0
@@ -257,7 +257,7 @@ def _as_law(curve: Curve, strain: Array) -> tuple[Array, TabulatedElasticity]:
     return F, TabulatedElasticity(F.tolist(), (along - along[0]).tolist())
 
 
-def _yield_onset(curve: Curve) -> float | None:
+def _yield_onset(curve: FittedCurve) -> float | None:
     """Return F [N] from which EA surely stays below 0.8 of its plateau, which no slip raises."""
     F = curve.tension
     level = curve.level
@@ -268,7 +268,7 @@ def _yield_onset(curve: Curve) -> float | None:
     return float(F[onset]) if (level + _CERTAIN * curve.deviation < limit)[onset:].any() else None
 
 
-def _pretension_end(curve: Curve) -> float | None:
+def _pretension_end(curve: FittedCurve) -> float | None:
     """Return F [N] beyond which EA grows slower than √F, midway from EA ∝ F to constant, if any."""
     F = curve.tension[(curve.tension > _STEP * curve.tension[0])]
     F = F[curve.tension[-1] > F * _STEP]

@@ -14,7 +14,7 @@ import cdsm
 from cdsm import plots
 from cdsm.planning.path_plan import PathPlan
 from cdsm.plots.projection import projection
-from cdsm.plots.style import TENSIONS
+from cdsm.plots.style import TENSION_COLORS
 from tests.support.arms import mixed_arm, random_posture
 from tests.support.pictures import artists, line, require_look
 from tests.support.sweeps import short_arm
@@ -49,12 +49,14 @@ def test_cables_stand_where_they_are_coloured_by_tension_and_nearer_ones_in_fron
         for k in range(len(path) - 1):
             segment = lines.pop(f"cable:{name}:{k}")
             np.testing.assert_allclose(segment.get_xydata(), 1e3 * path[k : k + 2, [0, 2]])
-            shade = TENSIONS((F - low) / (high - low))
+            shade = TENSION_COLORS((F - low) / (high - low))
             np.testing.assert_allclose(to_rgba(segment.get_color()), shade, atol=1e-9)
             layers.append(segment.get_zorder())
             depths.append(-path[k : k + 2, 1].mean())
     assert not lines
-    assert sum(TENSIONS(1.0)[:3]) > 2.0 * sum(TENSIONS(0.0)[:3])  # brighter: pulled more
+    assert sum(TENSION_COLORS(1.0)[:3]) > 2.0 * sum(
+        TENSION_COLORS(0.0)[:3]
+    )  # brighter: pulled more
     assert (np.diff(np.array(layers)[np.argsort(depths)]) > -1e-12).all()
     assert np.ptp(layers) > 0.01
     for k, bone in enumerate(POSE.bones):
@@ -127,7 +129,7 @@ def test_arms_beside_each_other_have_one_scale() -> None:
         name = POSE.arm.cables.names[0]
         share = (values[0] - both.min()) / np.ptp(both)
         color = artists(ax, "cable:")[f"cable:{name}:0"].get_color()
-        np.testing.assert_allclose(to_rgba(color), TENSIONS(share), atol=1e-9)
+        np.testing.assert_allclose(to_rgba(color), TENSION_COLORS(share), atol=1e-9)
     assert (first.get_title(loc="left"), second.get_title(loc="left")) == ("a", "b")
     require_look([first, second])
 
