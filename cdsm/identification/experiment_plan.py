@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import InvalidInput
-from cdsm.identification.determination import Determination
 from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.measurement import WeightLoop
 from cdsm.manipulator import Manipulator
+from cdsm.support.determination import Determination
 from cdsm.support.format import aligned, coordinates
 from cdsm.support.progress import show_progress
 from cdsm.support.result import Result, quantity, unit

@@ -12,8 +12,9 @@ from cdsm.errors import InvalidInput, listed
 from cdsm.identification.identify import check_measurements, fit_parameters
 from cdsm.identification.least_squares import LeastSquares, Test
 from cdsm.identification.measurement import Measurement
-from cdsm.identification.result import Identification, independent_readings, likely
+from cdsm.identification.result import Identification, independent_readings
 from cdsm.manipulator import Manipulator
+from cdsm.support.determination import likely
 from cdsm.support.format import aligned, plural
 from cdsm.support.progress import progress_allowed, show_progress
 from cdsm.support.result import Result, quantity, unit

@@ -12,9 +12,10 @@ from cdsm.arm_parameters import ArmParameters
 from cdsm.errors import InvalidInput
 from cdsm.identification.least_squares import LeastSquares, TensionOf, Test
 from cdsm.identification.measurement import Measurement, WeightLoop, measurement_name
-from cdsm.identification.result import Identification, independent_readings, likely
+from cdsm.identification.result import Identification, independent_readings
 from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
+from cdsm.support.determination import likely
 from cdsm.support.format import plural
 from cdsm.support.progress import progress_allowed
 from cdsm.support.validation import scalar, vector

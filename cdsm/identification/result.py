@@ -10,14 +10,15 @@ from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtr, chdtrc, ndtri
+from scipy.special import ndtri
 
 from cdsm.errors import InvalidInput
-from cdsm.identification.determination import Determination, interval
+from cdsm.identification.intervals import interval
 from cdsm.identification.least_squares import LeastSquares, Test
 from cdsm.identification.measurement import WeightLoop, measurement_name
 from cdsm.manipulator import Manipulator
 from cdsm.stiffness_matrix.prints import frictionless_model
+from cdsm.support.determination import Determination, chi_square_text, likely
 from cdsm.support.format import aligned
 from cdsm.support.progress import progress_allowed
 from cdsm.support.result import Result, quantity, unit
@@ -26,14 +27,8 @@ from cdsm.support.values import Array, Plotted, frozen
 
 _CORRELATED = 0.95  # a warning names two parameters whose correlation exceeds this value
 _RIDGED = 0.9  # the print names two parameters whose correlation exceeds this value
-_UNLIKELY = 1e-3  # least probability of χ²; below it, the model does not explain the measurements
 _OWN = "own unit"
 _MIXED = "N/m or m"
-
-
-def likely(chi_square: float, freedom: int) -> bool:
-    """Whether right models leave this χ² or more in one of a thousand experiments, or oftener."""
-    return not freedom or float(chdtrc(freedom, chi_square)) >= _UNLIKELY
 
 
 def independent_readings(measurements: Sequence[Test]) -> int:
@@ -276,10 +271,7 @@ class Identification(Result, Plotted):
     @property
     def verdict(self) -> str:
         """χ² with its probability: of right models and σ, so many have a smaller one."""
-        text = f"χ² = {self.chi_square:.4g} with {self.freedom} degrees of freedom"
-        if self.freedom:
-            less = 100.0 * chdtr(self.freedom, self.chi_square)
-            text += f" (right models and σ: smaller in {less:.3g} % of all experiments)"
+        text = chi_square_text(self.chi_square, self.freedom)
         return f"{text}, rank {self.rank} of {len(self.names)}"
 
     @cached_property
