@@ -44,6 +44,14 @@ class ArmParameters:
         InvalidInput: There is no such parameter or cable. The arm has no such joint, no geometry,
             or other cables, leads, holes or springs than its geometry; or two names change the same
             number.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> model = cdsm.ArmParameters(arm, ("friction", "lead"))
+        >>> arm = model(friction=0.1, lead=0.3)
+        >>> arm.cables[0].friction, arm.cables[0].lead
+        ((0.0,), 0.3)
     """
 
     arm: Manipulator

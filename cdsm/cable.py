@@ -64,6 +64,14 @@ class Cable:
     Raises InvalidInput, which names the cable and the fault. Its methods take F [N], any shape, and
     l_0 [m], ``free_length``: InvalidInput if it is not positive, ElasticityRangeError if a tension
     is outside the law, or no tension gives an elongation.
+
+    Example:
+        >>> import cdsm
+        >>> sites = [("base_link", (-0.02, 0.03, 0.0)), ("link1", (-0.01, 0.03, 0.0))]
+        >>> sites = tuple(cdsm.Site(*site) for site in sites)
+        >>> cable = cdsm.Cable("cable1", sites, cdsm.LinearElasticity(48e3), lead=0.3)
+        >>> cable.friction, cable.control
+        ((0.0,), 'position')
     """
 
     name: str
@@ -244,6 +252,13 @@ def serpentine_cables(
 
     Raises:
         InvalidInput: ``elasticity`` is not a law, or not one for each cable.
+
+    Example:
+        >>> import cdsm
+        >>> geometry = cdsm.presets.virtual_prototype_geometry()
+        >>> cables = cdsm.serpentine_cables(geometry, cdsm.presets.STRAND_1X19)
+        >>> len(cables), cables[-1].name, len(cables[-1].sites)
+        (15, 'cable5_3', 10)
     """
     names = instance("geometry", geometry, Geometry).cable_names
     n = len(geometry.cables)

@@ -37,6 +37,12 @@ class Site:
         wrap: Wrap angle [rad] beyond that between the two segments, e.g. of a curved tube, 0 to 4π.
 
     Raises InvalidInput if an attribute is anything else.
+
+    Example:
+        >>> import cdsm
+        >>> hole = cdsm.Site("link1", (0.01, 0.025, 0.0), friction=0.1)
+        >>> hole.link, hole.friction
+        ('link1', 0.1)
     """
 
     link: str
@@ -78,6 +84,12 @@ class Pulley:
         bearing: Friction of a pulley that turns, μ_bearing r_bearing/r [-], 0 to 1; not both.
 
     Raises InvalidInput if an attribute is anything else.
+
+    Example:
+        >>> import cdsm
+        >>> pulley = cdsm.Pulley("link1", position=(0, 0, 0), axis=(0, 0, 1), radius=0.008)
+        >>> pulley.radius, pulley.groove
+        (0.008, True)
     """
 
     link: str
@@ -142,6 +154,12 @@ class JointPulley:
         bearing: Friction of a pulley that turns, μ_bearing r_bearing/r [-].
 
     Raises InvalidInput if an attribute is anything else.
+
+    Example:
+        >>> import cdsm
+        >>> pulley = cdsm.JointPulley("mcp", radius=0.008, turn="+")
+        >>> pulley.joint, pulley.turns
+        ('mcp', 0)
     """
 
     joint: str
@@ -190,6 +208,12 @@ class Sheath:
             sheath for μφ = 1.
 
     Raises InvalidInput if an attribute is anything else.
+
+    Example:
+        >>> import cdsm
+        >>> sheath = cdsm.Sheath(length=0.5, wrap=1.57, friction=0.15)
+        >>> sheath.pieces
+        8
     """
 
     length: float

@@ -37,6 +37,14 @@ class CdsmError(Exception):
     """Base class of all errors raised by cdsm.
 
     ``status`` is the member of :class:`~cdsm.Status` for its cause, which a batch has in its place.
+
+    Example:
+        >>> import cdsm
+        >>> try:
+        ...     cdsm.presets.virtual_prototype().at([0.1] * 9)
+        ... except cdsm.CdsmError as error:
+        ...     print(type(error).__name__)
+        InvalidInput
     """
 
     status: Status = Status.FAILED
@@ -150,6 +158,15 @@ class InfeasibleTension(CdsmError):
     tension, ``binding`` names those at a bound then, and ``relaxation`` [N] is the least widening
     of all bounds that helps, or inf. ``fixed`` names the cables if their fixed tensions prevent it.
     ``hint`` becomes part of the message.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.3] * 10)
+        >>> try:
+        ...     cdsm.distribute_tension(pose, minimum=5.0, maximum=20.0)
+        ... except cdsm.InfeasibleTension as error:
+        ...     print(error.joint)
+        joint1_2
     """
 
     status = Status.INFEASIBLE
@@ -199,6 +216,15 @@ class SingularStiffness(CdsmError, ArithmeticError):
 
     ``direction`` is the joint motion (nv,) with the least stiffness or without mass,
     or the direction (3,) in base axes in which the tip cannot move; of unit length.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> try:
+        ...     cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0)).spatial()
+        ... except cdsm.SingularStiffness as error:
+        ...     print(str(error)[:30])
+        the tip has 5 of 6 motions, so
     """
 
     status = Status.SINGULAR
@@ -239,6 +265,15 @@ class UnreachableStiffness(CdsmError):
     ``low`` and ``high`` (or inf) [N/m] are the ends of the range, ``nearest`` the end next to the
     target, or the values that were found below and above it. ``hint``, which may say how to widen
     the range, becomes part of the message.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> try:
+        ...     cdsm.plan_stiffness(pose, "z", 1e6, minimum=5.0, maximum=100.0)
+        ... except cdsm.UnreachableStiffness as error:
+        ...     print(f"{1e-3 * error.low:.2f} to {1e-3 * error.high:.1f} N/mm")
+        2.10 to 61.2 N/mm
     """
 
     status = Status.UNREACHABLE_STIFFNESS

@@ -30,6 +30,15 @@ class Load:
 
     Raises:
         InvalidInput: A vector is not three finite numbers. The arm refuses unknown links.
+
+    Example:
+        >>> import cdsm
+        >>> camera = cdsm.Load("link2", force=(0.0, -1.5, 0.0))
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> pose = arm.at([0.1] * 10)
+        >>> F = cdsm.distribute_tension(pose, minimum=5.0, wrench=[camera])
+        >>> round(F["cable1_1"], 2)
+        35.08
     """
 
     link: str

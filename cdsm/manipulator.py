@@ -71,6 +71,13 @@ class Manipulator(ComputedArm):
         InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, or gravity is
             not three numbers. Two cables have the same name, or a cable is on an unknown link.
         FileError: The file of the cables cannot be read.
+
+    Example:
+        >>> import cdsm
+        >>> geometry = cdsm.presets.virtual_prototype_geometry()
+        >>> arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(48e3))
+        >>> arm
+        <Manipulator virtual_prototype: 5 joints (10 degrees of freedom), 15 cables, 0.22 m long>
     """
 
     def __init__(
@@ -130,6 +137,13 @@ class Manipulator(ComputedArm):
             GeometryError: The URDF is not a supported robot; lists every fault.
             InvalidInput: As for :class:`Manipulator`. No link is called ``tip``, or ``joint_names``
                 does not name each moving joint once.
+
+        Example:
+            >>> import cdsm
+            >>> arm = cdsm.presets.virtual_prototype()
+            >>> path = "urdf/virtual_prototype.urdf"
+            >>> cdsm.Manipulator.from_urdf(path, tip="tool0", cables=arm.cables).nv
+            10
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
         defined: Any = {"cables": _read(cables), "joint_names": joint_names, "gravity": gravity}
@@ -160,6 +174,11 @@ class Manipulator(ComputedArm):
             FileError: The file cannot be read or does not describe an arm. Every fault is listed.
                 The file has no wire for some cables, and ``wire`` is not given.
             GeometryError, InvalidInput: As :meth:`from_urdf`.
+
+        Example:
+            >>> import cdsm
+            >>> cdsm.Manipulator.read("examples/arm.toml").name
+            'arm'
         """
         from cdsm.arm_file.arm import read_arm  # pydantic: slow to import
 
@@ -204,6 +223,12 @@ class Manipulator(ComputedArm):
             InvalidInput: q is not (nv,) finite real numbers, or ``check_limits`` is not a bool. An
                 angle is beyond its limit, and ``check_limits`` is True. Two neighbouring sites of a
                 cable coincide at this posture.
+
+        Example:
+            >>> import cdsm
+            >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+            >>> (1e3 * pose.tip[:3, 3]).round(2).tolist()  # mm
+            [198.68, 57.55, -56.48]
         """
         q = self.checked_angles(q, check_limits)
         routing = self.routing
@@ -251,7 +276,14 @@ class Manipulator(ComputedArm):
         return self.replace(cables=_read(cables))
 
     def with_friction(self, friction: float) -> Manipulator:
-        """Return the same arm with one friction coefficient μ [-], from 0 to 2, in all holes."""
+        """Return the same arm with one friction coefficient μ [-], from 0 to 2, in all holes.
+
+        Example:
+            >>> import cdsm
+            >>> arm = cdsm.presets.virtual_prototype().with_friction(0.1)
+            >>> arm.cables[-1].friction
+            (0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1)
+        """
         return self.replace(cables=[cable.with_friction(friction) for cable in self.cables])
 
     def with_tolerances(self, tolerances: Tolerances) -> Manipulator:
@@ -281,11 +313,24 @@ class Manipulator(ComputedArm):
 
         Raises:
             InvalidInput: An object is no term, or a name is in use.
+
+        Example:
+            >>> import cdsm
+            >>> arm = cdsm.presets.virtual_prototype()
+            >>> arm.with_terms([]) == arm
+            True
         """
         return self.replace(terms=terms)
 
     def with_gravity(self, gravity: Direction) -> Manipulator:
-        """Return the same arm under another gravity: (3,) [m/s²] in base axes, or an axis."""
+        """Return the same arm under another gravity: (3,) [m/s²] in base axes, or an axis.
+
+        Example:
+            >>> import cdsm
+            >>> arm = cdsm.presets.virtual_prototype().with_gravity((0.0, 0.0, -9.81))
+            >>> arm.gravity.tolist()
+            [0.0, 0.0, -9.81]
+        """
         return self.replace(gravity=gravity)
 
 

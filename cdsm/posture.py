@@ -50,6 +50,12 @@ class Posture(ReadOnlyState):
         sites: Positions (3, P) [m] of the sites of all cables, and of their contacts with pulleys.
         spans: Segments of all cables, with their motions.
         wrapping: Cables over pulleys; None for an arm without pulleys.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> pose.length_jacobian.shape, float(pose.cable_lengths[0].round(6))
+        ((15, 10), 0.016956)
     """
 
     arm: Manipulator

@@ -49,6 +49,11 @@ class Tolerance:
         of: Names of the inputs that have this tolerance, as a pattern: ``"cable1_*"``.
 
     Raises InvalidInput, also for an unknown ``distribution``.
+
+    Example:
+        >>> import cdsm
+        >>> round(cdsm.Tolerance.within(1e-4).standard, 9)
+        5.7735e-05
     """
 
     standard: float
@@ -109,6 +114,12 @@ class Tolerances:
         site: Each coordinate of each cable site [m]; for an arm from a URDF, instead of its holes.
 
     Raises InvalidInput if one is negative, not a number, or larger than a plausible error.
+
+    Example:
+        >>> import cdsm
+        >>> tolerances = cdsm.Tolerances(tension=0.5, hole_radius=cdsm.Tolerance.within(1e-4))
+        >>> list(tolerances.given)
+        ['tension', 'hole_radius']
     """
 
     _pairs: tuple[tuple[str, tuple[Tolerance, ...]], ...]

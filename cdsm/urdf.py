@@ -52,6 +52,12 @@ def to_urdf(geometry: Geometry) -> str:
     first disk. A cross, or a link of mass zero, has 1e-6 kg and 1e-9 kg m², so that simulators
     accept it. Disks and backbone are visual shapes. There are no collision shapes, since
     neighbouring disks touch at the joint limits. Raises InvalidInput.
+
+    Example:
+        >>> import cdsm
+        >>> text = cdsm.to_urdf(cdsm.presets.virtual_prototype_geometry())
+        >>> text.count('type="revolute"')
+        10
     """
     chain = instance("geometry", geometry, Geometry).chain
     links = [E.link(name="base_link"), *(_body(geometry, body) for body in chain.bodies)]
@@ -98,6 +104,14 @@ def write_urdf(geometry: Geometry, path: str | os.PathLike[str]) -> Path:
         InvalidInput: ``geometry`` is not a Geometry.
         FileError: The file cannot be written; an existing file stays unchanged.
         GeometryError: The two parsers disagree.
+
+    Example:
+        >>> from tempfile import TemporaryDirectory
+        >>> import cdsm
+        >>> geometry = cdsm.presets.virtual_prototype_geometry()
+        >>> with TemporaryDirectory() as folder:
+        ...     cdsm.write_urdf(geometry, f"{folder}/arm.urdf").name
+        'arm.urdf'
     """
     text = to_urdf(geometry)
     return write_file(path, lambda aside: _write_and_read_back(aside, text, geometry.length))

@@ -55,6 +55,22 @@ def test_results_are_read_only_and_equal_after_a_copy(result: Any) -> None:
                 setattr(again, name, None)
 
 
+def test_public_callables_show_an_example_that_the_plain_run_tries() -> None:
+    public = [
+        (name, getattr(module, name))
+        for module in (cdsm, cdsm.plots, cdsm.presets)
+        for name in module.__all__
+    ]
+    silent = [
+        name
+        for name, value in public
+        if callable(value) and not name.startswith("Cdsm") and not name.endswith("Error")
+        if ">>> " not in (inspect.getdoc(value) or "")
+    ]
+    assert silent == ["InvalidInput", "Status"]  # made by no user
+    assert len(public) - len(silent) > 90
+
+
 ERRORS = (
     cdsm.InvalidInput("q", "is odd."),
     cdsm.FileError("/nowhere/arm.toml", "does not exist."),

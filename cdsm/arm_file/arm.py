@@ -73,6 +73,17 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
     Raises:
         FileError: The file cannot be read or does not describe cables. Every fault is listed. The
             file names no wire for some cables, and ``wire`` is not given.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tempfile import TemporaryDirectory
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> with TemporaryDirectory() as folder:
+        ...     path = cdsm.write_cables(arm.cables, Path(folder, "cables.toml"))
+        ...     cables = cdsm.read_cables(path)
+        >>> cables == arm.cables
+        True
     """
     return tuple(read_model(path, wire, robot=False)[1])
 
@@ -87,6 +98,16 @@ def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
     Raises:
         InvalidInput: No cables are given, or an elasticity of this kind cannot be written.
         FileError: The file cannot be written.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tempfile import TemporaryDirectory
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> with TemporaryDirectory() as folder:
+        ...     text = cdsm.write_cables(arm.cables, Path(folder, "cables.toml")).read_text()
+        >>> text.count("[[cables]]")
+        15
     """
     cables = sequence_of("cables", cables, Cable)
     if not cables:

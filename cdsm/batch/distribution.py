@@ -77,6 +77,14 @@ def distribute_tensions(
     Raises:
         InvalidInput: An argument has the wrong shape or is not a number, or bounds contradict each
             other. A failure at a single posture sets :attr:`Tensions.status` instead.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> angles = [[0.0] * 10, [0.1] * 10]
+        >>> F = cdsm.distribute_tensions(arm, angles, minimum=5.0)
+        >>> F.values.shape, F.values.max(axis=1).round(2).tolist()
+        ((2, 15), [34.43, 33.13])
     """
     instance("arm", arm, Manipulator)
     angles = postures(arm, q)

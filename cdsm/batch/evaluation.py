@@ -146,6 +146,14 @@ def evaluate(
     Raises:
         InvalidInput: An argument has the wrong shape or is not a number; a tension is negative; or
             two arguments contradict each other or one is missing. An output does not exist.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> angles = [[0.0] * 10, [0.1] * 10]
+        >>> batch = cdsm.evaluate(arm, angles, outputs=["along"], direction="z", minimum=5.0)
+        >>> (1e-3 * batch["along"]).round(3).tolist()  # N/mm
+        [1.817, 2.105]
     """
     instance("arm", arm, Manipulator)
     names = _checked_outputs(outputs)

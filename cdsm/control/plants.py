@@ -98,6 +98,13 @@ class QuasiStaticPlant:
 
     Raises:
         InvalidInput: ``substeps`` is not a positive whole number.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> plant = cdsm.QuasiStaticPlant(arm, substeps=2)
+        >>> plant.substeps
+        2
     """
 
     arm: Manipulator
@@ -186,6 +193,12 @@ class MuJoCoPlant:
     Raises:
         CdsmError: mujoco is not installed.
         InvalidInput: The arm has friction, or a number is not positive.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> cdsm.MuJoCoPlant(arm, period=0.05).period
+        0.05
     """
 
     arm: Manipulator

@@ -69,6 +69,12 @@ class Sensors:
 
     Raises:
         InvalidInput: A value is negative or not a number, or delay or seed are not whole numbers.
+
+    Example:
+        >>> import cdsm
+        >>> sensors = cdsm.Sensors(encoder=1e-5, tension_noise=0.1, seed=1)
+        >>> sensors.delay
+        0
     """
 
     encoder: float = 1e-5

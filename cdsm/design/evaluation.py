@@ -172,6 +172,12 @@ def evaluate_designs(
 
     Raises:
         InvalidInput: A design is outside its ranges, or ``jobs`` is below 1.
+
+    Example:
+        >>> import cdsm
+        >>> problem = cdsm.DesignProblem.read("examples/design.toml")
+        >>> print(cdsm.evaluate_designs(problem, [problem.start], progress=False))
+        <Designs: 1, 0 feasible>
     """
     instance("problem", problem, DesignProblem)
     rows = np.atleast_2d(number_array("designs", designs))

@@ -103,6 +103,11 @@ class Objective(Measure):
     Raises:
         InvalidInput: ``of`` or ``goal`` is unknown. ``direction`` is missing, or is given for a
             quantity without a direction.
+
+    Example:
+        >>> import cdsm
+        >>> cdsm.Objective("along", direction="z", goal="most").direction
+        (0.0, 0.0, 1.0)
     """
 
     goal: Literal["most", "least"] | None = None
@@ -132,6 +137,11 @@ class Constraint(Measure):
     Raises:
         InvalidInput: ``of`` is unknown. No limit is given, or two; or ``direction`` is missing, or
             is given for a quantity without a direction.
+
+    Example:
+        >>> import cdsm
+        >>> cdsm.Constraint("payload", direction="-z", at_least=2.0).limit
+        2.0
     """
 
     at_least: float | None = None

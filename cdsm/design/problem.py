@@ -60,6 +60,12 @@ class DesignProblem(ReadOnlyState):
         InvalidInput: An argument is invalid; two variables change the same thing; the arm was made
             from a URDF, or its leads or holes are not those of its geometry. The arm does not have
             a cable that is named.
+
+    Example:
+        >>> import cdsm
+        >>> problem = cdsm.DesignProblem.read("examples/design.toml")
+        >>> [variable.of for variable in problem.variables]
+        ['hole_radius', 'disk_offset', 'cables_per_joint', 'minimum']
     """
 
     arm: Manipulator

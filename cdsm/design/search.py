@@ -49,6 +49,14 @@ def search_designs(
             constraint it misses by how much.
         InvalidInput: An argument is invalid.
         CdsmError: pymoo is not installed.
+
+    Example:
+        >>> import cdsm
+        >>> problem = cdsm.DesignProblem.read("examples/design.toml")
+        >>> options = {"generations": 1, "population": 8, "seed": 1, "progress": False}
+        >>> search = cdsm.search_designs(problem, **options)
+        >>> print(str(search).splitlines()[0])
+        8 designs, 4 feasible, 3 on the front; * is the compromise
     """
     instance("problem", problem, DesignProblem)
     steps = whole_number("generations", generations, 1)

@@ -56,6 +56,11 @@ class Variable:
     Raises:
         InvalidInput: There is no such variable. The range is empty or not of numbers; or joint or
             cable are missing, or given for a variable that has one value for the arm.
+
+    Example:
+        >>> import cdsm
+        >>> cdsm.Variable("hole_radius", 0.02, 0.04).is_continuous
+        True
     """
 
     of: str

@@ -77,6 +77,16 @@ def stuck_stiffness(
     :func:`~cdsm.stiffness`; with it, larger: the difference is positive semidefinite.
 
     :func:`~cdsm.stiffness` explains the arguments and the errors.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype(friction=0.1)
+        >>> pose = arm.at([0.1] * 10)
+        >>> F = cdsm.distribute_tension(pose, minimum=5.0)
+        >>> K = cdsm.stiffness(pose, F)  # as if all holes slid without friction
+        >>> stuck = cdsm.stuck_stiffness(pose, F)
+        >>> print(f"{1e-3 * K.along('z'):.2f}, stuck {1e-3 * stuck.along('z'):.2f} N/mm")
+        2.10, stuck 6.30 N/mm
     """
     F, W = checked_tension(pose, tension, wrench)
     none = np.zeros(pose.segments.wrap.size, dtype=np.bool_)
@@ -115,6 +125,14 @@ def breakaway(
         InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is not a direction.
         ElasticityRangeError: A tension leaves the domain of its cable's elasticity.
         SingularStiffness: The stuck arm is about to buckle.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype(friction=0.1)
+        >>> pose = arm.at([0.1] * 10)
+        >>> F = cdsm.distribute_tension(pose, minimum=5.0)
+        >>> print(cdsm.breakaway(pose, F, "-y"))
+        breakaway along (0, -1, 0): 0.06066 N, first at site 9 of cable5_3 (link4)
     """
     u = unit_direction("direction", direction)
     at = None if link is None else link_point(pose.arm, link, point)
@@ -260,6 +278,15 @@ def rest_band(
 
     Arguments and errors are those of :func:`breakaway`; ``wrench`` is the load that acts now, and
     ``direction`` that of the displacement. SingularStiffness also if the frictionless K_θ is.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype(friction=0.1)
+        >>> pose = arm.at([0.1] * 10)
+        >>> F = cdsm.distribute_tension(pose, minimum=5.0)
+        >>> band = cdsm.rest_band(pose, F, "-y")
+        >>> print(f"{1e3 * band.half_width:.4f} mm")
+        0.0933 mm
     """
     K = stiffness(pose, tension, wrench)
     u = unit_direction("direction", direction)

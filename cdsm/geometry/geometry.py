@@ -66,6 +66,15 @@ class Geometry(Printed):
 
     Warns:
         CdsmWarning: Cables share a hole, or lengths look like mm, or angles like degrees.
+
+    Example:
+        >>> import cdsm
+        >>> geometry = cdsm.Geometry.universal(
+        ...     joints=4, cables_per_joint=3, link_length=0.06, base_length=0.03,
+        ...     disk_offset=0.012, hole_radius=0.025, link_mass=0.12, joint_limit=0.35,
+        ... )
+        >>> round(geometry.length, 3), geometry.cable_names[:3]
+        (0.27, ('cable1_1', 'cable1_2', 'cable1_3'))
     """
 
     joints: Annotated[

@@ -51,6 +51,12 @@ class Joint:
             then that of the line of centres: the links turn by 1 + r₁/r₂ times as much, and
             limits, springs and stiffnesses count for this angle. The ``disk_offset`` counts from
             the contact.
+
+    Example:
+        >>> import cdsm
+        >>> joint = cdsm.Joint(axes=((0, 1, 0), (0, 0, 1)), disk_offset=0.01, limit=0.35)
+        >>> len(joint.axes)
+        2
     """
 
     axes: Annotated[tuple[records.Vector, ...], Field(strict=False, max_length=2)] = ()
@@ -124,6 +130,11 @@ class Link:
         torsion_stiffness: GJ [N m²]; None: EI/1.3, as of a tube with Poisson's ratio 0.3; inf: it
             does not twist.
         pieces: Number of equal pieces of each of these beams.
+
+    Example:
+        >>> import cdsm
+        >>> cdsm.Link(length=0.04, mass=0.5).length
+        0.04
     """
 
     length: records.Length
@@ -146,6 +157,11 @@ class CableRoute:
             a lead, the actuator is at the base disk, and there is no friction there.
         radius: Distance of its holes from the arm's axis on every disk [m], e.g. of an inner ring;
             None: the hole radius of each disk.
+
+    Example:
+        >>> import cdsm
+        >>> cdsm.CableRoute(joint=2, angle=1.57, lead=0.3, friction=0.1).joint
+        2
     """
 
     joint: Annotated[records.Integer, Field(ge=1)]

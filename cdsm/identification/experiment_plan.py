@@ -101,7 +101,8 @@ class ExperimentPlan(Result, Plotted):
             rows.append(f"not determined by any candidate: {combination} (relative)")
         if self.undetermined and not self.open_combinations:
             rows.append(f"too few tests to determine {', '.join(self.undetermined)}")
-        return "\n".join([*rows, *(f"left out: {name}: {why}" for name, why in self.failures)])
+        rows += [f"left out: {name}: {why}" for name, why in self.failures]
+        return "\n".join(rows).rstrip()
 
     def _labels(self) -> dict[str, Sequence[object]]:
         return {"parameter": self.names, "candidate": [loop.label for loop in self.candidates]}
@@ -146,6 +147,23 @@ def plan_experiment(
     Raises:
         InvalidInput: An argument is invalid, or ``model_of`` fails or does not take a parameter; no
             candidate can be tested, or none determines any parameter.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype(cdsm.LinearElasticity(48e3), friction=0.1)
+        >>> model = cdsm.ArmParameters(arm, ("rigidity", "friction"))
+        >>> plan = cdsm.plan_experiment(
+        ...     model, {"rigidity": 1.0, "friction": 0.1}, postures=[[0.1] * 10],
+        ...     directions=["y", "z"], weights=[2.0, 20.0], minimum=5.0, tests=1,
+        ...     displacement_std=2e-5, progress=False,
+        ... )
+        >>> print(plan)
+        test                times
+        posture 1, z, 20 N     1×
+        <BLANKLINE>
+        parameter [own unit]  expected      95 %
+        rigidity                     1  ± 16.6 %
+        friction                   0.1   ± 639 %
     """
     angles = number_array("postures", postures)
     forces = number_array("weights", weights, "force")

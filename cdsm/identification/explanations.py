@@ -178,6 +178,19 @@ def compare_explanations(
 
     Raises:
         InvalidInput: As for :func:`identify`; or ``model_of`` needs a parameter that is not given.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype(cdsm.LinearElasticity(48e3))
+        >>> model = cdsm.ArmParameters(arm, ("rigidity", "lead"))
+        >>> tests = [
+        ...     cdsm.Measurement(along, axis, angles=(0.1,) * 10, minimum=5.0, std=100.0)
+        ...     for axis, along in (("x", 275.2e3), ("y", 87.5e3), ("z", 89.7e3))
+        ... ]
+        >>> free = {"rigidity": (0.5, 2.0), "lead": (0.0, 1.0)}
+        >>> explained = cdsm.compare_explanations(model, tests, free, progress=False)
+        >>> print(str(explained).splitlines()[5])
+        rigidity explains these measurements.
     """
     if not isinstance(free, Mapping) or len(free) < 2:
         raise InvalidInput("free", f"{free!r} given; give the bounds of two or more parameters.")

@@ -60,6 +60,13 @@ def read_loops(
         FileError: The file cannot be read, a column is missing or has no unit, or an entry is
             wrong; the line and the column are named.
         InvalidInput: ``displacement_std`` or ``minimum`` is invalid.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.Manipulator.read("examples/arm.toml")
+        >>> loops = cdsm.read_loops("examples/data/LOOPS.csv", arm, displacement_std=2e-5)
+        >>> len(loops), loops[0].label
+        (2, 'down')
     """
     joints = instance("arm", arm, Manipulator).joint_names
     cables = arm.cables.names
@@ -170,6 +177,13 @@ def read_tip_positions(
         FileError: The file cannot be read, a column is missing or has no unit, or an entry is
             wrong; the line and the column are named.
         InvalidInput: ``std`` is invalid.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.Manipulator.read("examples/backbone.toml")
+        >>> positions = cdsm.read_tip_positions("examples/data/TIPS.csv", arm, std=1e-3)
+        >>> len(positions)
+        6
     """
     names = instance("arm", arm, Manipulator).cables.names
     units = {"label": _TEXT} | dict.fromkeys("xyz", _LENGTH) | dict.fromkeys(names, _LENGTH)

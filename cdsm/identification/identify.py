@@ -77,6 +77,15 @@ def identify(
             invalid; ``model_of`` or ``tension_of`` fails or does not take a parameter; or the start
             does not give every measurement a stable prediction; or a position is far outside the
             arm, as in mm.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype(cdsm.LinearElasticity(48e3))
+        >>> model = cdsm.ArmParameters(arm, ("rigidity",))
+        >>> tests = [cdsm.Measurement(87.5e3, "y", angles=(0.1,) * 10, minimum=5.0, std=100.0)]
+        >>> identified = cdsm.identify(model, tests, {"rigidity": (0.5, 2.0)}, progress=False)
+        >>> print(f"EA times {identified.values[0]:.3f}")
+        EA times 0.900
     """
     with progress_allowed(progress):
         return fit_parameters(model_of, measurements, free, start, tension_of, other_starts=True)

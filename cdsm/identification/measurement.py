@@ -60,6 +60,12 @@ class Measurement:
 
     Raises:
         InvalidInput: A field is invalid. The error names the field and the fault.
+
+    Example:
+        >>> import cdsm
+        >>> test = cdsm.Measurement(2.1e3, "z", angles=(0.1,) * 10, minimum=5.0, std=50.0)
+        >>> test.value
+        2100.0
     """
 
     value: float
@@ -143,6 +149,16 @@ class WeightLoop:
     Raises:
         InvalidInput: A field is invalid, or all forces are the same. The error names the field and
             the fault.
+
+    Example:
+        >>> import cdsm
+        >>> loop = cdsm.WeightLoop(
+        ...     direction="z", angles=(0.1,) * 10, forces=(0.0, 2.0, 4.0, 2.0, 0.0),
+        ...     displacements=(0.0, 0.9e-3, 1.9e-3, 1.1e-3, 0.2e-3),
+        ...     displacement_std=2e-5, minimum=5.0,
+        ... )
+        >>> len(loop.forces)
+        5
     """
 
     direction: tuple[float, float, float] | Axis

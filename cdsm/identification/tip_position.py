@@ -46,6 +46,12 @@ class TipPosition:
 
     Raises:
         InvalidInput: A field is invalid. The error names the field and the fault.
+
+    Example:
+        >>> import cdsm
+        >>> position = cdsm.TipPosition(x=0.233, std=1e-3, pull=(0.005, 0.0, 0.0))
+        >>> position.x
+        0.233
     """
 
     x: float | None = None

@@ -96,6 +96,11 @@ def read_caspr(
         FileError: A file cannot be read, is not a CASPR model, or has parts that cannot be mapped:
             other joints, cables that are not ideal, pulleys. The first such part is named.
         GeometryError: A link has impossible moments of inertia.
+
+    Example:
+        >>> import cdsm
+        >>> wire = cdsm.LinearElasticity(48e3)
+        >>> arm = cdsm.read_caspr("bodies.xml", "cables.xml", elasticity=wire)  # doctest: +SKIP
     """
     checked_law(elasticity)
     path = as_path(bodies)

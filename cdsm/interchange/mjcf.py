@@ -116,6 +116,14 @@ def to_mjcf(
             both dampings are given, or an argument is invalid. ``actuators`` is unknown. A cable
             runs over two pulleys without a site between them, or around one more than once.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> pose = arm.at([0.1] * 10)
+        >>> text = cdsm.to_mjcf(arm, pose, cdsm.distribute_tension(pose, minimum=5.0))
+        >>> text.count("<spatial ")
+        15
     """
     model = mujoco_model(arm, pose, tension, actuators, damping_ratio, damping)
     if model.unstable is not None:

@@ -87,6 +87,14 @@ def clearance(pose: Posture, diameter: float = 0.0, thickness: float = 0.0) -> C
 
     Raises:
         InvalidInput: ``diameter`` or ``thickness`` is negative or not a length.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> print(cdsm.clearance(pose, diameter=1.2e-3))
+        cable to cable  11.24 mm, cable1_3 and cable5_2
+        cable to link   22.63 mm, cable2_2 and the base
+        cable to disk   2.4 mm, cable5_3 and disk 10
     """
     d = checked_quantity("diameter", diameter, "diameter", zero=True)
     t = checked_quantity("thickness", thickness, "length", zero=True)

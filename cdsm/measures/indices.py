@@ -22,6 +22,12 @@ def tension_factor(pose: Posture) -> float:
     tensions can balance every joint torque (Gouttefarde and Gosselin, IEEE T-RO 22, 2006). Pham,
     Yeo, Yang and Chen, Robotics and Autonomous Systems 57 (2009), use the ratio of one solution, so
     their factor may be smaller. Raises CdsmError if the linear program fails.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> round(cdsm.tension_factor(pose), 4)
+        0.9233
     """
     J = instance("pose", pose, Posture).length_jacobian
     count, nv = J.shape
@@ -47,6 +53,13 @@ def isotropy(stiffness: Stiffness) -> float:
     The stiffness along u is 1/(uᵀ C_vv u), Eq. 20. The ratio is 0 if the stiffness is infinite in
     some directions, and 1 if it is infinite in all. Raises InvalidInput if the arm is unstable, and
     SingularStiffness if K_θ is singular.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0))
+        >>> round(cdsm.isotropy(K), 4)
+        0.0229
     """
     K = instance("stiffness", stiffness, Stiffness)
     if K.margin < 0.0:

@@ -166,6 +166,14 @@ def payload(
         ElasticityRangeError: A tension without the force is outside the domain of its law.
         SingularStiffness: K_θ without the force is singular.
         CdsmError: A linear program fails.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> print(cdsm.payload(pose, "-y", minimum=5.0, maximum=100.0))
+        direction (0, -1, 0)
+        motors follow: 50.24 N (5.121 kg), limit: maximum of cable2_1 (100 N)
+        motors locked: 52.05 N (5.306 kg), limit: maximum of cable2_1 (100 N)
     """
     instance("pose", pose, Posture)
     allowed = checked_quantity("deflection", deflection, "length", infinite=True)

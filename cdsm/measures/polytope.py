@@ -120,6 +120,13 @@ def force_polytope(
         InfeasibleTension: No tensions within the bounds balance any force at the tip, not even
             zero; the error gives the smallest violation.
         CdsmError: A linear program fails.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> polytope = cdsm.force_polytope(pose, minimum=5.0, maximum=100.0)
+        >>> print(polytope)
+        50 corners; holds 45.11 N in any direction, least along (0.138, -0.855, 0.5)
     """
     instance("pose", pose, Posture)
     bounds = bounds_at(pose, minimum, maximum, worst_friction)

@@ -75,6 +75,13 @@ def plan_path(
     Raises:
         InvalidInput: Neither or both of ``angles`` and ``tips`` are given; a target or a largest
             change is not positive; or another argument is invalid.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> plan = cdsm.plan_path(arm, "z", 2500.0, 5.0, 200.0, angles=[[0.08] * 10, [0.1] * 10])
+        >>> print(plan)
+        2 of 2 samples planned, with 5 to 33.41 N, which change by up to 0.6345 N per sample
     """
     instance("arm", arm, Manipulator)
     path = checked_path(arm, angles, tips)

@@ -153,6 +153,13 @@ def plan_stiffness(
         ElasticityRangeError: None of them are within the domains of the elasticities.
         SingularStiffness: The tip cannot move along a direction, or no admissible tensions make the
             arm stable.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> plan = cdsm.plan_stiffness(pose, "z", 3000.0, minimum=5.0, maximum=300.0)
+        >>> round(plan.tension["cable1_1"], 1), round(plan.achieved, 1)
+        (33.1, 3000.0)
     """
     directions = unit_directions("direction", direction)
     targets = checked_targets(target, directions.shape[:-1])

@@ -136,6 +136,13 @@ def stiffness_range(
         ElasticityRangeError: None of them are within the domains of the elasticities.
         SingularStiffness: The tip cannot move along u, or no admissible tensions make the arm
             stable.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> ends = cdsm.stiffness_range(pose, "z", minimum=5.0, maximum=300.0)
+        >>> print(f"{1e-3 * ends.low:.3f} to {1e-3 * ends.high:.2f} N/mm")
+        0.043 to 89.67 N/mm
     """
     u = unit_direction("direction", direction)
     number = whole_number("starts", starts, 1, 1000)

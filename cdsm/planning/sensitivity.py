@@ -130,6 +130,14 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
     Raises:
         InvalidInput: ``stiffness`` is not a frictionless ``Stiffness``.
         ElasticityRangeError: A tension is outside the domain of its elasticity.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0))
+        >>> slope = cdsm.stiffness_gradient(K).along("z")
+        >>> print(f"cable1_2: {slope[1]:.3f} N/m per N")
+        cable1_2: 25.760 N/m per N
     """
     K = instance("stiffness", stiffness, Stiffness).require_frictionless()
     slope = K.posture.arm.laws.stiffness_slope(K.tension, K.cable_stiffness)
@@ -232,6 +240,13 @@ def saturation(
         InfeasibleTension: No tensions balance the arm even at the smallest lower bound.
         ElasticityRangeError: The tensions at the smallest lower bound are outside the elasticities.
         SingularStiffness: The tip cannot move along u, or the arm is stable at no lower bound.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> saturated = cdsm.saturation(pose, "z")
+        >>> f"with {saturated.bound:.0f} N {1e-3 * saturated.stiffness.along('z'):.2f} N/mm"
+        'with 213 N 86.85 N/mm'
     """
     arm = instance("pose", pose, Posture).arm
     u = unit_direction("direction", direction)

@@ -91,6 +91,13 @@ def plot_arm(
 
     Raises:
         InvalidInput: An argument has the wrong type, or belongs to another arm or posture.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> ax = cdsm.plots.plot_arm(pose, cdsm.distribute_tension(pose, minimum=5.0))
+        >>> ax.get_title(loc="left")
+        'virtual_prototype: how hard do its cables pull?'
     """
     scene = _scene(pose, tension, stiffness, force)
     panel = style.panel(ax, 2.2)
@@ -144,6 +151,13 @@ def plot_arms(
 
     Raises:
         InvalidInput: As :func:`plot_arm`; or there are no cases, or too few axes.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> panels = cdsm.plots.plot_arms([(arm.at([0.0] * 10),), (arm.at([0.1] * 10),)])
+        >>> panels.size
+        2
     """
     if not cases:
         raise InvalidInput("cases", "is empty; give a posture, or more.")

@@ -82,6 +82,12 @@ def plot_tensions(
         ax: Ordinary axes to draw on; None: a new figure of one column.
         breaking: Breaking load [N] of a wire, of which the bars then show percents.
         title: Title; None: the arm's name and the question.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> cdsm.plots.plot_tensions(cdsm.distribute_tension(pose, minimum=5.0)).get_xlabel()
+        'tension [N]'
     """
     panel, y, highest = _tension_bars(tension, ax, breaking)
     _bounds(panel, y, tension)

@@ -96,6 +96,13 @@ def plot_stiffness_over_tension(
         InvalidInput: An argument is invalid.
         InfeasibleTension: No tensions balance the arm at any of the levels.
         SingularStiffness: The arm is unstable at all of them, or its tip cannot move along u.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> ax = cdsm.plots.plot_stiffness_over_tension(pose, [5.0, 50.0, 100.0, 200.0], "z")
+        >>> ax.get_xlabel(), ax.get_ylabel()
+        ('least tension of all cables [N]', 'stiffness along z [N/mm]')
     """
     wrench: Array = np.asarray(NO_WRENCH, dtype=float)
     saturated = None
@@ -253,6 +260,14 @@ def plot_tension_curve(
     Raises:
         InvalidInput: ``dataset`` is no sweep, or has several postures, wrenches or only one
             minimum. It has no such quantity, or that has more numbers.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> levels = [5.0, 20.0, 80.0]
+        >>> data = cdsm.sweep(arm, [[0.1] * 10], minimum=levels, progress=False)
+        >>> cdsm.plots.plot_tension_curve(data).size
+        3
     """
     check_sweep(dataset)
     curve = dataset[one_of("quantity", quantity, map(str, dataset.data_vars))].squeeze(drop=True)

@@ -106,6 +106,14 @@ def plot_map(
             ``quantity`` has more than one number per entry, ``section`` is invalid or contains no
             tip, or the statistic is unknown.
         CdsmError: xarray is not installed.
+
+    Example:
+        >>> import cdsm
+        >>> data = cdsm.sweep(
+        ...     cdsm.presets.virtual_prototype(), cdsm.RandomPoses(50), minimum=5.0, progress=False
+        ... )
+        >>> cdsm.plots.plot_map(data, "margin").size
+        3
     """
     check_sweep(dataset)
     one_of("statistic", statistic, get_args(Statistic))

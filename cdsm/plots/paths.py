@@ -61,6 +61,13 @@ def plot_path(
     Raises:
         InvalidInput: ``path`` has no postures of one arm, or ``animate`` does not end in ``.gif``.
         FileError: The film cannot be written.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> poses = [arm.at([0.02 * i] * 10) for i in range(5)]
+        >>> cdsm.plots.plot_path(poses).get_title(loc="left")
+        'virtual_prototype: which way does it go?'
     """
     poses: Sequence[Any]
     if isinstance(path, Sequence):

@@ -47,6 +47,13 @@ def plot_stiffness_ranges(
     Raises:
         InvalidInput: A range is missing or of the wrong type, the directions are not in one
             coordinate plane, or ``ax`` is not polar.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> ranges = [cdsm.stiffness_range(pose, "z", 5.0, most) for most in (50.0, 100.0)]
+        >>> len(cdsm.plots.plot_stiffness_ranges({"straight": ranges}).lines) > 0
+        True
     """
     every = [attainable for row in ranges.values() for attainable in row]
     for attainable in every:

@@ -123,6 +123,14 @@ def save_figure(figure: Figure | Axes | Panels, path: str | os.PathLike[str]) ->
     Raises:
         InvalidInput: The path ends neither in ``.pdf``, ``.svg`` nor ``.png``.
         FileError: The file cannot be written.
+
+    Example:
+        >>> from tempfile import TemporaryDirectory
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> with TemporaryDirectory() as folder:
+        ...     cdsm.plots.save_figure(pose.plot(), f"{folder}/arm.svg").name
+        'arm.svg'
     """
     suffix = as_path(path).suffix.lower()
     if suffix not in _DATELESS:

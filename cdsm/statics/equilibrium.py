@@ -399,6 +399,14 @@ def equilibrium(
             of its law. A law does not say how a cable becomes slack or yields.
         EquilibriumError: No equilibrium was found. If two sites of a cable meet (disks overlap),
             the error names this cable.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> F = cdsm.distribute_tension(pose, minimum=5.0)
+        >>> rest = cdsm.equilibrium(pose, F, wrench=[0, -5, 0, 0, 0, 0])  # motors locked, then 5 N
+        >>> f"{1e3 * (rest.pose.tip[1, 3] - pose.tip[1, 3]):.3f} mm"
+        '-1.904 mm'
     """
     K = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
     W = K.applied if wrench is None else loads_of(pose.arm, wrench)

@@ -87,6 +87,13 @@ def forward_statics(
             or ``start`` is given with friction.
         ElasticityRangeError: Motors hold lengths, and a tension is outside the domain of its law.
         EquilibriumError: No stable equilibrium was found, or nothing holds a joint.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.nitinol_segment()
+        >>> rest = cdsm.forward_statics(arm, pull={"cable10_1": 0.005})
+        >>> (1e3 * rest.pose.tip[:3, 3]).round(1).tolist()  # mm
+        [222.8, 0.0, 97.1]
     """
     instance("arm", arm, Manipulator)
     commands = {"tension": tension, "rest_lengths": rest_lengths, "pull": pull}

@@ -181,7 +181,7 @@ class LoadHistory(Result, Plotted):
             if count > _SHOWN and _SHOWN // 2 <= k < count - _SHOWN // 2:
                 rows += [f"{'…':>5}"] * (k == _SHOWN // 2)
                 continue
-            force = "".join(f"{f:>11.4g}" for f in self.wrenches[k, :3])
+            force = "".join(f"{f:>z11.4g}" for f in self.wrenches[k, :3])
             moved = "".join(f"{1000.0 * x:>z10.4f}" for x in moves[k])
             slide = np.count_nonzero(self.sliding[k])
             lost = 1000.0 * self.dissipated[k]
@@ -245,6 +245,15 @@ def load_cycle(
         ElasticityRangeError: A tension at the reference or at a load is outside the domain of its
             law.
         EquilibriumError: No equilibrium was found in the step to a load. The error names the load.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype(friction=0.1).at([0.1] * 10)
+        >>> F = cdsm.distribute_tension(pose, minimum=5.0)
+        >>> loads = [[0, 0, 0, 0, 0, 0], [0, -4, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0]]
+        >>> history = cdsm.load_cycle(pose, F, loads)
+        >>> print(f"{1e3 * history.dissipated.sum():.3f} mJ lost in the holes")
+        0.567 mJ lost in the holes
     """
     return follow_loads(pose, tension, wrenches, motors=motors, substeps=substeps)[0]
 

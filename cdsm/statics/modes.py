@@ -90,6 +90,13 @@ def modes(stiffness: Stiffness) -> Modes:
         InvalidInput: ``stiffness`` is no Stiffness.
         SingularStiffness: A joint moves no mass, or hardly more than the placeholders of crosses
             and massless links.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0))
+        >>> cdsm.modes(K).frequencies[:2].round(2).tolist()  # Hz
+        [10.24, 10.97]
     """
     pose = instance("stiffness", stiffness, Stiffness).posture
     arm = pose.arm

@@ -292,6 +292,17 @@ def weight_test(
         EquilibriumError: The arm buckles under a part of the load. The error names this part.
             :func:`~cdsm.equilibrium` finds the posture after buckling.
         SingularStiffness: The arm has friction and is about to buckle without the weight.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> F = cdsm.distribute_tension(pose, minimum=5.0)
+        >>> print(cdsm.weight_test(pose, F, [0, -5, 0]))
+          load [N]      x [mm]      y [mm]      z [mm]
+                 5      0.4314      -1.904     -0.8392
+            linear      0.6876       -2.22      -0.739
+        stiffness along the force: measured 2.627 N/mm, linear 2.252 N/mm
+        (linear is frictionless, rigid links, tangent; measured the secant over this weight)
     """
     force = vector("force", force, 3, "a force in base axes [N]", "force")
     if not force.any():

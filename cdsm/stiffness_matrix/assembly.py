@@ -34,6 +34,13 @@ def stiffness(
     Raises:
         InvalidInput: A shape is wrong, a tension negative, or of another posture or arm.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0))
+        >>> print(f"{1e-3 * K.along('z'):.3f} N/mm, stable: {K.is_stable}")
+        2.105 N/mm, stable: True
     """
     F, W = checked_tension(pose, tension, wrench)
     k = pose.arm.laws.stiffness(pose.cable_lengths, F)

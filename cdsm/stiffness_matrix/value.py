@@ -72,6 +72,13 @@ class Stiffness(Result, Loaded):
             ``"sliding"``: they slide in some of them.
         segment_tension: T (S,) [N] of :attr:`Posture.segments`; None if frictionless.
         tension_gradient: ∂T/∂θ (S, nv) [N/rad] of these segments; None if frictionless.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0))
+        >>> f"{1e-3 * K.along('z'):.3f} N/mm, softest joint motion {K.margin:.3f} N m/rad"
+        '2.105 N/mm, softest joint motion 2.526 N m/rad'
     """
 
     _headline = "margin"
@@ -213,6 +220,13 @@ class Stiffness(Result, Loaded):
         Raises:
             InvalidInput: There is no such link, or ``at`` is not (3,).
             SingularStiffness: K_θ is singular.
+
+        Example:
+            >>> import cdsm
+            >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+            >>> K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0))
+            >>> f"{1.0 / K.compliance_at()[2, 2]:.1f} N/m"
+            '2104.8 N/m'
         """
         T, _ = transform(self.posture, frame_name(frame), at)
         return frozen(T @ self.compliance @ T.T)
@@ -227,6 +241,16 @@ class Stiffness(Result, Loaded):
             InvalidInput: There is no such link, or ``at`` is not (3,).
             SingularStiffness: K_θ is singular, or the tip lacks one of its six motions, which the
                 error names. Rank is judged at 1e-9 with the arm's length as lever.
+
+        Example:
+            >>> import cdsm
+            >>> import numpy as np
+            >>> pose = cdsm.presets.virtual_prototype().at(np.linspace(-0.1, 0.2, 10))
+            >>> K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0))
+            >>> np.asarray(K.spatial(frame="link5", at="tip"))[:3, :3].round(-2)
+            array([[ 519500., -146100.,  139000.],
+                   [-146100.,   64000.,  -32100.],
+                   [ 139000.,  -32100.,   46600.]])
         """
         T, point = transform(self.posture, frame_name(frame), at)
         require_six_motions(self.posture)
@@ -281,6 +305,13 @@ class Stiffness(Result, Loaded):
 
         ``link`` is where the force acts and the displacement is read, instead of the tip: at the
         ``point`` (3,) [m] in the frame of the link; None: its disk, or its frame (:class:`Load`).
+
+        Example:
+            >>> import cdsm
+            >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+            >>> K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0))
+            >>> round(K.along("z"), 1), round(K.along("z", link="link2"), 1)
+            (2104.8, 17182.8)
         """
         u = unit_direction("direction", direction)
         J_v = None if link is None else self.jacobian_at(link, point)[:3]
@@ -425,6 +456,13 @@ class Stiffness(Result, Loaded):
 
         If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ, and K_θ
         is a sum over cables and other terms. SingularStiffness also if it is inf.
+
+        Example:
+            >>> import cdsm
+            >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+            >>> K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0))
+            >>> print(str(K.shares("z")).splitlines()[-2])
+            total                                 2.105  100.0%
         """
         u = unit_direction("direction", direction)
         self.require_mobile(u)
@@ -465,7 +503,15 @@ class Stiffness(Result, Loaded):
         return self.verdict.warnings
 
     def report(self) -> Report:
-        """Check this frictionless stiffness: is it right, balanced, stable, and how to read it."""
+        """Check this frictionless stiffness: is it right, balanced, stable, and how to read it.
+
+        Example:
+            >>> import cdsm
+            >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+            >>> K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0))
+            >>> print(str(K.report()).splitlines()[1])
+            PASS: agrees with finite differences, tensions balance the arm, arm is stable.
+        """
         above = import_module("cdsm.report")  # a chapter that this one cannot import
         report: Report = above.report_on(self.require_frictionless())
         return report

@@ -50,6 +50,19 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
     Raises:
         CdsmError: xarray, netCDF4 or zarr is needed and not installed.
         FileError: The file does not exist, cannot be read, or is not a sweep.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tempfile import TemporaryDirectory
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> data = cdsm.sweep(arm, cdsm.RandomPoses(20), minimum=5.0, progress=False)
+        >>> with TemporaryDirectory() as folder:
+        ...     path = Path(folder, "sweep.nc")
+        ...     _ = data.to_netcdf(path)
+        ...     again = cdsm.read_sweep(path)
+        >>> again.sizes["pose"]
+        20
     """
     path = as_path(path)
     need("sweep", "xarray", "zarr" if path.is_dir() else "netCDF4")

@@ -101,6 +101,12 @@ class GridPoses(PoseSet):
 
     Raises:
         InvalidInput: No joint is named; one has no angles, an angle twice, or is in ``rest`` too.
+
+    Example:
+        >>> import cdsm
+        >>> poses = cdsm.GridPoses({"joint1_1": [-0.1, 0.0, 0.1], "joint1_2": [0.0, 0.1]})
+        >>> poses.angles(cdsm.presets.virtual_prototype()).shape
+        (3, 2, 10)
     """
 
     swept: Mapping[str, tuple[float, ...]]
@@ -150,6 +156,12 @@ class PathPoses(ReadOnlyState, PoseSet):
 
     Raises:
         InvalidInput: ``waypoints`` are not (n, nv), n ≥ 2, or all equal; or ``count`` is below 2.
+
+    Example:
+        >>> import cdsm
+        >>> poses = cdsm.PathPoses([[0.0] * 10, [0.1] * 10], count=5)
+        >>> poses.angles(cdsm.presets.virtual_prototype()).sizes["pose"]
+        5
     """
 
     waypoints: ArrayLike
@@ -192,6 +204,11 @@ class RandomPoses(PoseSet):
 
     Raises:
         InvalidInput: ``count`` is below 1 or above 2³⁰, or ``seed`` is not a whole number ≥ 0.
+
+    Example:
+        >>> import cdsm
+        >>> cdsm.RandomPoses(2000, seed=1).count
+        2000
     """
 
     count: int
@@ -238,6 +255,11 @@ class PlanePoses(PoseSet):
     Raises:
         InvalidInput: ``axis`` is no axis, or ``step`` is not above zero. For an arm: the plane is
             out of reach, or has more than 40 000 tips.
+
+    Example:
+        >>> import cdsm
+        >>> cdsm.PlanePoses("y", 0.0, step=0.01).axis
+        'y'
     """
 
     axis: str

@@ -90,6 +90,13 @@ def sweep(
             does not exist.
         CdsmError: xarray, dask, or zarr for a store, is not installed.
         FileError: The store cannot be created, read or written, or has another sweep.
+
+    Example:
+        >>> import cdsm
+        >>> arm = cdsm.presets.virtual_prototype()
+        >>> data = cdsm.sweep(arm, cdsm.RandomPoses(50, seed=1), minimum=5.0, progress=False)
+        >>> float(data["along"].sel(direction="z").median().round(0))
+        2732.0
     """
     need("sweep", "xarray", "dask", *(["zarr"] if store is not None else []))
     names = (outputs,) if isinstance(outputs, str) else tuple(sequence_of("outputs", outputs, str))

@@ -49,6 +49,13 @@ class Tension(Result, Loaded, IndexedByName):
         solver: Name of the solver that computed them.
         least: Whether they are the smallest tensions within the bounds; False if they were planned
             for a stiffness.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> F = cdsm.distribute_tension(pose, minimum=5.0)
+        >>> round(F["cable1_1"], 3), len(F.at_minimum)
+        (33.132, 5)
     """
 
     _headline = "tension"
@@ -151,6 +158,13 @@ def distribute_tension(
         InfeasibleTension: No tension within the bounds balances the arm. The error gives the
             missing torque, and how far the bounds of cables without a fixed tension must widen.
         CdsmError: The solver's solution does not meet the optimality conditions.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> F = cdsm.distribute_tension(pose, minimum=5.0, wrench=[0, -5, 0, 0, 0, 0])
+        >>> F.values.round(1).tolist()
+        [39.5, 5.0, 6.0, 36.5, 5.0, 17.5, 28.4, 5.0, 22.0, 18.6, 5.0, 20.3, 10.4, 5.0, 14.7]
     """
     instance("pose", pose, Posture)
     tensions = {} if fixed is None else fixed

@@ -210,6 +210,15 @@ def uncertainty(
             or ``cable`` is unknown.
         ElasticityRangeError: A tension is outside the domain of its cable's law.
         SingularStiffness: The measurand does not exist.
+
+    Example:
+        >>> import cdsm
+        >>> pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+        >>> F = cdsm.distribute_tension(pose, minimum=5.0)
+        >>> tolerances = cdsm.Tolerances(tension=0.5, hole_radius=5e-5)
+        >>> budget = cdsm.uncertainty(pose, F, tolerances, direction="z")
+        >>> print(f"{budget.value:.0f} ± {budget.standard_uncertainty:.0f} N/m")
+        2105 ± 140 N/m
     """
     asked = measurand_of(pose, tension, direction, of, cable, wrench, redistribute)
     return budget_of(asked, tolerances)

@@ -36,6 +36,12 @@ class Elasticity(Plotted):
         low: Smallest tension [N].
         high: Largest tension [N]; inf if there is none.
         rest: Tension [N] at which the strain is zero: ``low``, but see :meth:`slack_below`.
+
+    Example:
+        >>> import cdsm
+        >>> law = cdsm.presets.STRAND_1X19
+        >>> round(float(law.rigidity(50.0))), round(float(law.strain(50.0)), 6)
+        (17711, 0.034656)
     """
 
     _figure = "plot_elasticity"
@@ -162,6 +168,11 @@ class Elasticity(Plotted):
         """Compute F [N] at strains [-], any shape: the inverse of :meth:`strain`.
 
         Raises ElasticityRangeError if no tension of the law gives one of the strains.
+
+        Example:
+            >>> import cdsm
+            >>> float(cdsm.LinearElasticity(48e3).tension(0.001))
+            48.0
         """
         return self._tension_of(number_array("strain", strain), "strain")
 

@@ -48,6 +48,11 @@ class LinearElasticity(Elasticity):
 
     ``rigidity`` is EA [N]. A CdsmWarning doubts it below 1 kN and above 1e9 N. Raises InvalidInput
     if it is not a number, or outside its range.
+
+    Example:
+        >>> import cdsm
+        >>> float(cdsm.LinearElasticity(48e3).strain(48.0))
+        0.001
     """
 
     def __init__(self, rigidity: float) -> None:
@@ -78,6 +83,12 @@ class StrandElasticity(Elasticity):
     ``coefficients`` are one tuple per range, lowest power first [N, 1, 1/N, …]; ``joins`` are the
     tensions [N] at which one range ends and the next begins. Raises InvalidInput if a number is
     invalid, 0 <= low < joins < high does not hold, two ranges do not meet, or EA is not positive.
+
+    Example:
+        >>> import cdsm
+        >>> law = cdsm.StrandElasticity.eq19_repaired()
+        >>> round(float(law.rigidity(600.0)))
+        42197
     """
 
     coefficients = property(lambda law: law.arguments["coefficients"], doc="As given, in tuples.")
@@ -134,6 +145,12 @@ class TabulatedElasticity(Elasticity):
 
     ``tensions`` [N] and ``strains`` [-] of two or more points must rise, tensions from 0 or more,
     or InvalidInput is raised. Only differences of strains matter.
+
+    Example:
+        >>> import cdsm
+        >>> law = cdsm.TabulatedElasticity([0.0, 50.0, 100.0], [0.0, 0.002, 0.003])
+        >>> round(float(law.strain(75.0)), 6)
+        0.002558
     """
 
     tensions = property(lambda law: law.arguments["tensions"], doc="As given [N], in a tuple.")

@@ -106,6 +106,12 @@ class RopeElasticity(Elasticity):
     ``rope`` is 1x7, 1x19, 7x7, 7x19 (stainless steel 316) or uhmwpe, ``diameter`` d is in m, and
     ``breaking_load`` [N] that of the maker; None: the least one of the table. A number that no such
     rope has, or a rope without a source, raises InvalidInput.
+
+    Example:
+        >>> import cdsm
+        >>> law = cdsm.RopeElasticity("7x7", 0.8e-3)
+        >>> round(float(law.rigidity(10.0)))
+        36772
     """
 
     def __init__(self, rope: str, diameter: float, breaking_load: float | None = None) -> None:

@@ -176,6 +176,19 @@ def fit_tensile_test(
         InvalidInput: An argument is not finite numbers, the arrays differ in length, the gauge
             length is not positive, the wire is compressed, the force does not rise or jumps, the
             units are impossible, or fewer than 8 points are left or lie below the yield.
+
+    Example:
+        >>> import cdsm
+        >>> test = cdsm.read_tensile_csv("examples/data/TEST.csv", gauge_length=0.5)
+        >>> fit = cdsm.fit_tensile_test(test.displacement, test.force, test.gauge_length)
+        >>> print(fit)
+        Tensile test of 92 points, gauge length 500 mm
+          tension   0.0444 N to 120.1 N
+          rigidity  3.679e+04 N to 3.681e+04 N, ± 0.18 % (one σ)
+          rms       0.11 N of force
+          stage     elastic 0.0444 N to 120.1 N
+          note      points after the largest force left out: 25
+          note      points of holds left out: 6
     """
     u = number_array("displacement", displacement)
     F = number_array("force", force)

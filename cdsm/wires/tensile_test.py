@@ -89,6 +89,12 @@ def read_tensile_csv(
         InvalidInput: ``columns`` or ``units`` are not two texts; ``decimal`` is another mark.
         FileError: The file cannot be read; a column, a unit or the gauge length is missing, not
             known or not unique; or a cell is not a number (the line is named).
+
+    Example:
+        >>> import cdsm
+        >>> test = cdsm.read_tensile_csv("examples/data/TEST.csv", gauge_length=0.5)
+        >>> test.force.size, float(test.force.max().round(1))
+        (92, 120.1)
     """
     for name, pair in (("columns", columns), ("units", units)):
         if pair is not None and len(sequence_of(name, pair, str)) != 2:
