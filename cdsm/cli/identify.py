@@ -64,6 +64,7 @@ def fit(
         "gauge_length_m": data.gauge_length,
         "domain_N": [fitted.elasticity.low, fitted.elasticity.high],
         "stages_N": {stage.name: [stage.low, stage.high] for stage in fitted.stages},
+        "relative_uncertainty": fitted.relative_uncertainty(),
         "notes": fitted.notes,
     }
     return answer(as_json, read | fitted.to_dict(), f"{test}: {data.source}\n{fitted}")

@@ -164,7 +164,7 @@ def sweep_postures(
     from cdsm.sweeps.infeasible import explain_infeasible
     from cdsm.sweeps.poses import joint_angles
     from cdsm.sweeps.store import read_into_memory
-    from cdsm.sweeps.summary import curve_lines, quantile_lines
+    from cdsm.sweeps.summary import curve, curve_lines, quantile_lines, quantiles
 
     low = options.parse_numbers("--minimum", minimum)
     at_one = angles is not None
@@ -208,7 +208,13 @@ def sweep_postures(
     if "tension" in dataset and (share := largest_share(robot.cables, dataset["tension"].values)):
         lines.append(share)
         numbers |= {"largest_share_of_breaking_force": share}
-    lines += curve_lines(dataset.isel(pose=0)) if at_one else quantile_lines(dataset)
+    if at_one:
+        at_posture = dataset.isel(pose=0)
+        lines += curve_lines(at_posture)
+        numbers["curve"] = curve(at_posture)
+    else:
+        lines += quantile_lines(dataset)
+        numbers["quantiles"] = quantiles(dataset)
     causes: Json = {}
     explanations = {
         cdsm.Status.INFEASIBLE: explain_infeasible,

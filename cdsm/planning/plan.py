@@ -74,6 +74,11 @@ class StiffnessPlan(Result):
         """Whether :attr:`misfit` is at most 1e-6; for one direction, it always is."""
         return self.misfit <= REACHED
 
+    @quantity("joint stiffness")
+    def margin(self) -> float:
+        """Smallest joint stiffness [N m/rad] under the planned tensions."""
+        return self.stiffness.margin
+
     @quantity("m", "cable")
     def cable_lengths(self) -> Array:
         """Cable lengths L (C,) [m], lead included."""
@@ -105,7 +110,7 @@ class StiffnessPlan(Result):
             f"along {coordinates(u)}: {stiffness_text(value)} ({stiffness_text(target)} {wanted})"
             for u, (value, target) in zip(self.direction.reshape(-1, 3), pairs, strict=True)
         ]
-        margin = f"{self.stiffness.margin:.4g} {self.posture.arm.stiffness_unit()}"
+        margin = f"{self.margin:.4g} {self.posture.arm.stiffness_unit()}"
         model = frictionless_model(self.posture.arm)
         return "\n".join([str(self.tension), *rows, f"smallest joint stiffness {margin} ({model})"])
 

@@ -78,11 +78,14 @@ class StiffnessRange(Result, Plotted):
 
         Such an end depends on ``floor``, a convention, more than on the arm.
         """
-        low, high = (
-            stiffness(self.posture, F).margin <= (1.0 + AT_END) * self.floor
-            for F in (self.low_tension, self.high_tension)
-        )
+        low, high = (self.margins <= (1.0 + AT_END) * self.floor).tolist()
         return low, high
+
+    @quantity("joint stiffness", "end")
+    def margins(self) -> Array:
+        """Smallest joint stiffness [N m/rad] of the softest and of the stiffest arm (2,)."""
+        both = (self.low_tension, self.high_tension)
+        return frozen(np.array([stiffness(self.posture, F).margin for F in both]))
 
     def __contains__(self, target: float) -> bool:
         return self.low <= target <= self.high
@@ -94,8 +97,9 @@ class StiffnessRange(Result, Plotted):
         lines = [f"{along} {stiffness_text(*self.ends)} ({frictionless_model(arm)})"]
         unit = arm.stiffness_unit()
         tensions = {"softest": self.low_tension, "stiffest": self.high_tension}
-        for (name, F), stops in zip(tensions.items(), limited, strict=True):
-            margin = f"smallest joint stiffness {stiffness(self.posture, F).margin:.4g} {unit}"
+        rows = zip(tensions.items(), self.margins, limited, strict=True)
+        for (name, F), least, stops in rows:
+            margin = f"smallest joint stiffness {least:.4g} {unit}"
             stop = ", limited by stability" if stops else ""
             lines.append(f"{name} with {span(F.values)} N, {margin}{stop}")
         return "\n".join(lines)

@@ -14,7 +14,7 @@ from cdsm.applied import texts
 from cdsm.errors import SingularStiffness
 from cdsm.quantities import display_for
 from cdsm.stiffness_matrix.verdict import least_joint_stiffness
-from cdsm.support.format import MODEL, coordinates, key, largest_finite, span
+from cdsm.support.format import MODEL, coordinates, key, largest_finite, span, without_rounding
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
@@ -78,6 +78,8 @@ def table_rows(K: Stiffness) -> list[tuple[str, ...]]:
         if mobile.any():
             rows[-2, mobile] = K.cartesian_in(axes[mobile]).diagonal()
         rows[-1] = K.pseudoinverse().diagonal()
+    for i in np.flatnonzero(mobile).tolist():
+        rows[:-2, i] = without_rounding(rows[:-2, i])
     unit, size = display_for("N/m", largest_finite(rows[0]))
     cells = [["-" if math.isnan(k) else f"{k:.4g}" for k in row] for row in rows / size]
     along = "along, softer side" if K.slack else "along"
