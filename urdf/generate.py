@@ -7,84 +7,19 @@ the dimensions of models of CASPR (darwinlau/CASPR, BSD-3-Clause, commit a6971ee
 structure that was measured. A TOML keeps the comment at its head: where its numbers are from.
 """
 
-import math
 import re
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
 
 import cdsm
 from cdsm import paper, presets
+from cdsm.presets.bodies import AXES, Body, Point, chain
 
 FOLDER = Path(__file__).parent
-sys.path.insert(0, str(FOLDER.parent / "examples"))
-
-import tensegrity_simplex  # noqa: E402
-
+X, Y, Z = AXES
 WIRE = cdsm.LinearElasticity(48e3)  # EA [N] of a steel strand of 1.2 mm; CASPR's do not stretch
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)  # axes of joints
-Point = tuple[float, float, float]
 Route = Sequence[tuple[str, Point]]  # sites of a cable: link and point
-
-
-class Body(NamedTuple):
-    """A link behind joints whose axes meet in one point."""
-
-    name: str
-    at: Point  # that point in the frame of the link before [m]
-    axes: tuple[Point, ...]  # of the joints, in their order
-    limit: float  # of the joints, in both directions [rad]
-    mass: float  # [kg]
-    centre: Point  # of mass [m]
-    inertia: Point  # ixx, iyy, izz about it [kg m²]
-
-
-INERTIAL = """    <inertial>
-      <origin xyz="{centre}"/>
-      <mass value="{mass}"/>
-      <inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/>
-    </inertial>
-"""
-JOINT = """  <joint name="{name}_joint{i}" type="revolute">
-    <parent link="{parent}"/>
-    <child link="{child}"/>
-    <origin xyz="{at}"/>
-    <axis xyz="{axis}"/>
-    <limit lower="{lower}" upper="{upper}" effort="1" velocity="1"/>
-  </joint>
-"""
-TIP = """  <link name="tool0"/>
-  <joint name="tool0_joint" type="fixed">
-    <parent link="{parent}"/>
-    <child link="tool0"/>
-    <origin xyz="{at}"/>
-  </joint>
-</robot>
-"""
-
-
-def text(point: Sequence[float]) -> str:
-    """Write numbers with a blank between them."""
-    return " ".join(map(repr, point))
-
-
-def chain(name: str, bodies: Sequence[Body], tip: Point) -> str:
-    """Write the URDF of bodies in series; ``tool0`` is at ``tip`` of the last one."""
-    said, parent = f'<robot name="{name}">\n  <link name="base"/>\n', "base"
-    for body in bodies:
-        xx, yy, zz = body.inertia
-        mass = INERTIAL.format(centre=text(body.centre), mass=body.mass, xx=xx, yy=yy, zz=zz)
-        limits = {"lower": -body.limit, "upper": body.limit}
-        for i, axis in enumerate(body.axes, start=1):
-            last, at = i == len(body.axes), body.at if i == 1 else (0.0, 0.0, 0.0)
-            ends = {"parent": parent, "child": body.name if last else f"{body.name}_{i}"}
-            said += f'  <link name="{ends["child"]}">\n{mass if last else ""}  </link>\n'
-            places = {"at": text(at), "axis": text(axis)}
-            said += JOINT.format(name=body.name, i=i, **ends, **places, **limits)
-            parent = ends["child"]
-    return said + TIP.format(parent=parent, at=text(tip))
 
 
 def arm_of(
@@ -96,26 +31,6 @@ def arm_of(
         for k, sites in enumerate(routes, start=1)
     ]
     return cdsm.Manipulator.from_urdf(chain(name, bodies, tip), cables, tip="tool0")
-
-
-def sjtu_snake() -> cdsm.Manipulator:
-    """Build the snake of Tang et al. (2017): 12 universal joints, 36 cables."""
-    radius, after, before, length = 0.019, 0.01357, 0.09257, 0.09921
-    centre, inertia = (0.0477162, 0.0, 0.0), (2.459410464e-5, 8.238686351e-5, 8.257404573e-5)
-    at = [(length if k else 0.0, 0.0, 0.0) for k in range(12)]
-    kept = (Z, Y), 0.35, 0.061973305, centre, inertia
-    bodies = [Body(f"link{k + 1}", at[k], *kept) for k in range(12)]
-    cables = []
-    for k in range(1, 13):
-        for j in range(3):
-            angle = math.radians(60 - 10 * k - 120 * j)
-            y, z = radius * math.sin(angle), radius * math.cos(angle)
-            sites = [cdsm.Site("base", (-after, y, z))]
-            for i in range(1, k + 1):
-                sites += [cdsm.Site(f"link{i}", (x, y, z)) for x in (after, before)]
-            cables.append(cdsm.Cable(f"cable{k}_{j + 1}", tuple(sites[:-1]), WIRE))
-    urdf = chain("sjtu_snake", bodies, (length, 0.0, 0.0))
-    return cdsm.Manipulator.from_urdf(urdf, cables, tip="tool0")
 
 
 def carex() -> cdsm.Manipulator:
@@ -174,7 +89,7 @@ def bm_arm() -> cdsm.Manipulator:
 
 
 HEAD = "# An arm of cdsm."  # begins what cdsm writes
-BUILDERS = (sjtu_snake, carex, myo_shoulder, bm_arm, tensegrity_simplex.simplex)
+BUILDERS = (presets.sjtu_snake, carex, myo_shoulder, bm_arm, presets.simplex)
 
 
 def files() -> dict[str, str]:

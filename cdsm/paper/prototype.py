@@ -31,6 +31,11 @@ def experimental_prototype_geometry(
         sizes: Other keywords of :meth:`cdsm.Geometry.hinged`: ``link_length`` (0.1 m),
             ``base_length`` (0.05 m), ``disk_offset`` (0.02 m), ``hole_radius`` (0.03 m), ``lead``
             (0.3 m) or ``friction`` (0; the paper has none).
+
+    Example:
+        >>> import cdsm
+        >>> cdsm.paper.experimental_prototype_geometry().hole_radius
+        0.03
     """
     assumed = {"link_length": 0.1, "base_length": 0.05, "disk_offset": 0.02, "hole_radius": 0.03}
     dimensions: dict[str, Any] = assumed | {"lead": 0.3, "joint_limit": np.deg2rad(30.0)} | sizes
@@ -63,6 +68,11 @@ def experimental_prototype(
             [N/m].
         gravity: Gravity in base axes (3,) [m/s²]; the direction −z is assumed.
         dimensions: Keywords of :func:`experimental_prototype_geometry`; all have assumed defaults.
+
+    Example:
+        >>> import cdsm
+        >>> [cable.control for cable in cdsm.paper.experimental_prototype().cables[:2]]
+        ['position', 'force']
     """
     geometry = experimental_prototype_geometry(**dimensions)
     first, second = (
@@ -86,6 +96,11 @@ def fitted_prototype(hybrid_stiffness: float | None = None) -> Manipulator:
     ``hybrid_stiffness`` is that of every cable [N/m], where a spring replaces the elasticity of the
     strand (Figs. 12 and 13). None: the strand, with a drive of 10 kN/mm behind it. Raises
     InvalidInput if it is not a positive number.
+
+    Example:
+        >>> import cdsm
+        >>> cdsm.paper.fitted_prototype().geometry.hole_radius
+        0.05
     """
     strand = hybrid_stiffness is None
     return experimental_prototype(

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from typing import NamedTuple
 
 import numpy as np
-import tensegrity_simplex
+import simplex as tensegrity
 
 import cdsm
 from cdsm.support.values import Array
@@ -37,15 +37,15 @@ def rows() -> list[Row]:
 
 
 def simplex() -> Iterator[Row]:
-    rest = tensegrity_simplex.at_rest()
-    stress = np.linalg.svd(tensegrity_simplex.simplex().at(np.zeros(12)).length_jacobian.T)[2][-1]
+    rest = tensegrity.at_rest()
+    stress = np.linalg.svd(cdsm.presets.simplex().at(np.zeros(12)).length_jacobian.T)[2][-1]
     yield Row("simplex: force in a strut", SIMPLEX, "kN", 1.5, rest.tension[9] / 1e3, 0.05)
     for name, cable, theirs in (("horizontal", 0, 0.393), ("diagonal", 6, 0.681)):
         ratio = float(stress[cable] / stress[9])
         yield Row(f"simplex: {name} cable over strut", SIMPLEX, "-", theirs, ratio, 5e-4)
     frequency = float(cdsm.modes(rest.stiffness).frequencies[0])
     yield Row("simplex: lowest mode, lumped masses", SIMPLEX, "Hz", 2.166, frequency, 5e-4)
-    share = 100.0 * tensegrity_simplex.active_share(rest)
+    share = 100.0 * tensegrity.active_share(rest)
     own = "numpy program of its own"
     yield Row("simplex: active share of that mode", own, "%", 81.0, share, 0.5)
 

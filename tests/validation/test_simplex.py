@@ -1,7 +1,7 @@
 """A tensegrity that was built and measured: its tensions and its lowest mode, nothing fitted."""
 
 import numpy as np
-import tensegrity_simplex as simplex
+import simplex
 
 import cdsm
 
