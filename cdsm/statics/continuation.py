@@ -1,142 +1,120 @@
 """Follow a stable equilibrium of an arm while its load grows from one share to another.
 
-Where it ends, K_θ is singular. There the share of the load is no good coordinate: at a fold it
-turns back. So the end is found along the arc of the branch (Riks, J. Appl. Mech. 39, 1972).
+The branch is followed piece by piece (:mod:`cdsm.statics.pieces`), so no step passes over a loss of
+stability that changes back within it. Where the branch ends, K_θ is singular, or jumps to a matrix
+that is not positive definite as a cable goes slack. At a singular K_θ the share of the load is no
+good coordinate: at a fold it turns back. So the end is found along the arc of the branch (Riks,
+J. Appl. Mech. 39, 1972).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
 from cdsm.errors import CdsmError
-from cdsm.posture import Posture
-from cdsm.statics.locked_arm import LockedArm
-from cdsm.statics.solve import FAR, Balance, Point, continued, least_eigenvalue, stable_between
-from cdsm.support.values import Array, Flags
+from cdsm.statics.pieces import (
+    Model,
+    Stage,
+    begun,
+    equilibrium_near,
+    is_held,
+    next_on_piece,
+    piece_of,
+    rate,
+    under,
+)
+from cdsm.statics.solve import FAR, Balance, least_eigenvalue
+from cdsm.support.values import Array
 
 _FINEST = 2.0**-12  # relative precision of the last share of the search; below 1e-9, absolute
 _RATE = 1e-6  # change of the share for a difference
 _STILL = 1e-9  # an arm that moves by less [rad] while the whole load comes does not move
 _NEWTON = 30  # most steps of Newton's method along the arc
 _CONVERGED = 1e-12  # largest |f| along the arc, over its scale
+_SNAP = 0.02  # largest motion of a joint [rad] of an arm that snaps through and is followed on
+_BEYOND = 1e-9  # part of the goal beyond the end of a branch, where the arm snaps through
 
 _LOST = CdsmError("the branch of equilibria cannot be followed to its end.")
-
-
-Model = Callable[[float], LockedArm]
-"""Arm under a share of the load and of the pull."""
-
-
-class Stage(NamedTuple):
-    """Equilibrium of a branch."""
-
-    share: float  # of the load and of the pull [-]
-    point: Point
-    balance: Balance
-    arm: LockedArm  # under this share
-
-    @property
-    def pose(self) -> Posture:
-        """Its posture."""
-        return self.point.state.pose
-
-
-def stage_at(model: Model, pose: Posture, stop_torque: Array, share: float) -> Stage:
-    """Return the equilibrium at a known posture, where the stops push with ``stop_torque``."""
-    arm = model(share)
-    f = Balance(arm.at, arm.reference, arm.at_pose(pose))
-    return Stage(share, f(pose.q / f.unit - stop_torque * f.unit / f.k), f, arm)
-
-
-def equilibrium_near(model: Model, share: float, before: Stage) -> Stage | None:
-    """Find the stable equilibrium near ``before`` under another share; None if there is none."""
-    arm = model(share)
-    pose = before.pose
-    f = Balance(arm.at, arm.reference, arm.at_pose(pose))
-    guess = pose.q / f.unit - before.point.stop_torque * f.unit / f.k
-    found = continued(f, (guess,), pose.q)
-    return None if found is None else Stage(share, found, f, arm)
 
 
 def follow(model: Model, start: Stage, goal: float) -> list[Stage]:
     """Follow a stable equilibrium while its share of load and pull grows to ``goal``.
 
-    Returns the equilibria on the way, ``start`` first. The last one has a smaller share than
-    ``goal`` if the branch ends before: a little beyond, the arm jumps.
+    Returns the equilibria on the way, ``start`` first; among them those where cables go slack or
+    taut, and where joints reach or leave their stops. Where the arm loses its stability as a cable
+    goes slack, and finds another equilibrium nearby, it goes on from there; else the last one has a
+    smaller share than ``goal``: it is the end of the branch, from which the arm jumps.
     """
-    branch = [start]
+    branch = [begun(model, start) if start.taut is None else start]
     step = goal - start.share
+    changes = 0  # at one share
     while (here := branch[-1]).share < goal:
-        there = equilibrium_near(model, min(goal, here.share + step), here)
-        if there is not None and stable_between(model(there.share).at, here.pose.q, there.pose.q):
+        ends = changes > 2 * (here.point.x.size + here.pose.cable_lengths.size)
+        there = None if ends else next_on_piece(model, here, min(goal, here.share + step))
+        if there is not None:
             branch.append(there)
+            changes = changes + 1 if there.share == here.share else 0
             step = 2.0 * step
-        elif step > _FINEST * max(here.share, 1e-9):
+        elif not ends and step > _FINEST * max(here.share, 1e-9):
             step /= 2.0
         else:
-            break
+            way, breaks = _to_end(model, here)
+            branch += way
+            snapped = _snapped(model, branch[-1], goal) if breaks else None
+            if snapped is None:
+                break
+            branch.append(snapped)
+            step = goal - snapped.share
+            changes = 0
     return branch
 
 
-def rate(model: Model, stage: Stage) -> Array:
-    """Compute dx/dshare (nv,) of the branch at an equilibrium."""
-    residual = [model(stage.share + h).at_pose(stage.pose).residual for h in (0.0, _RATE)]
-    change = (residual[1] - residual[0]) / _RATE * stage.balance.unit
-    return np.asarray(-np.linalg.lstsq(stage.point.slope, change)[0], np.float64)
+def _snapped(model: Model, end: Stage, goal: float) -> Stage | None:
+    """Return the equilibrium nearby to which an arm snaps where a cable goes slack, or None."""
+    share = end.share + _BEYOND * goal
+    stage = equilibrium_near(model, share, end) if share < goal else None
+    if stage is None or abs(stage.pose.q - end.pose.q).max() > _SNAP:
+        return None
+    return begun(model, stage)._replace(snapped=True)
 
 
-class BranchEnd(NamedTuple):
-    """Where a branch loses its stability."""
+def _to_end(model: Model, last: Stage) -> tuple[list[Stage], bool]:
+    """Return the equilibria from ``last`` to where the branch loses its stability, and how.
 
-    stage: Stage
-    slack: tuple[tuple[int, float], ...]  # cables that go slack on the way there, and the shares
-
-
-def end_of_branch(model: Model, last: Stage) -> BranchEnd | None:
-    """Find where the branch beyond ``last`` loses its stability.
-
-    The smallest eigenvalue of K_θ is 0 there, or falls below 0 as a cable goes slack. Returns None
-    if the way there cannot be followed.
+    There the smallest eigenvalue of K_θ is 0; or, the second result, it falls below 0 as a cable
+    goes slack. There are none if ``last`` is the end, or if the way there cannot be followed.
     """
-    taut = last.arm.continued_tensions(last.pose) >= 0.0
-    slack = list[tuple[int, float]]()
+    found = list[Stage]()
     here = last
-    for _ in range(taut.size + 1):
+    for _ in range(2 * here.pose.cable_lengths.size + 1):
+        if not is_held(model, here):
+            return found, True
         try:
-            stage, cable = _end_of_piece(model, here, taut)
+            stage, cable = _end_of_piece(model, here)
         except CdsmError:
-            return None
-        if cable is not None:
-            slack.append((cable, stage.share))
-            taut = taut & (np.arange(taut.size) != cable)
-        after = _held(model(stage.share), taut, stage)
-        if cable is None or least_eigenvalue(after.balance, after.point) <= 0.0:
-            return BranchEnd(after, tuple(slack))
-        here = after
-    return None
+            break
+        assert here.taut is not None
+        taut = here.taut if cable is None else here.taut ^ (np.arange(here.taut.size) == cable)
+        here = under(model, stage, taut)
+        found.append(here)
+        if cable is None:
+            return found, False
+    return [], False
 
 
-def _held(arm: LockedArm, taut: Flags, stage: Stage) -> Stage:
-    """Return an equilibrium as that of an arm whose cables stay taut or slack."""
-    kept = arm.keeping(taut)
-    balance = stage.balance.under(kept.at)
-    return Stage(stage.share, balance(stage.point.x), balance, kept)
-
-
-def _end_of_piece(model: Model, last: Stage, taut: Flags) -> tuple[Stage, int | None]:
-    """Follow an arm whose cables stay taut or slack to where one would push, or to λ = 0.
+def _end_of_piece(model: Model, last: Stage) -> tuple[Stage, int | None]:
+    """Follow a piece to where a cable goes slack or taut, or to λ = 0, along its arc.
 
     Returns the equilibrium there and the cable; None where the smallest eigenvalue λ of K_θ is 0.
     """
     from scipy.optimize import brentq  # slow to import
 
-    def kept(share: float) -> LockedArm:
-        return model(share).keeping(taut)
-
+    kept = piece_of(model, last)
+    taut = last.taut
+    assert taut is not None
+    last = under(kept, last, taut)
     speed = rate(kept, last)
     length = float(np.linalg.norm(speed))
     still = length <= _STILL  # as a straight arm does under a load along it
@@ -155,7 +133,8 @@ def _end_of_piece(model: Model, last: Stage, taut: Flags) -> tuple[Stage, int | 
 
     def values(distance: float) -> Array:
         stage = at(distance)
-        F = np.where(taut, stage.arm.continued_tensions(stage.pose), math.inf)
+        F = stage.arm.continued_tensions(stage.pose)
+        F = np.where(stage.arm.locks, np.where(taut, F, -F), math.inf)
         return np.append(F, least_eigenvalue(stage.balance, stage.point))
 
     low = 0.0
@@ -174,7 +153,7 @@ def _end_of_piece(model: Model, last: Stage, taut: Flags) -> tuple[Stage, int | 
         for i in np.flatnonzero(values(high) <= 0.0).tolist()
     }
     first = min(roots, key=lambda i: roots[i])
-    return at(roots[first]), first if first < taut.size else None
+    return at(roots[first]), first if first < last.pose.cable_lengths.size else None
 
 
 def _on_arc(

@@ -18,17 +18,9 @@ from numpy.typing import NDArray
 
 from cdsm.applied import combined, scaled
 from cdsm.manipulator import Manipulator
-from cdsm.statics.continuation import (
-    Model,
-    Stage,
-    end_of_branch,
-    equilibrium_near,
-    follow,
-    rate,
-    stage_at,
-)
+from cdsm.statics.continuation import follow
 from cdsm.statics.locked_arm import LockedArm
-from cdsm.statics.solve import Point
+from cdsm.statics.pieces import PRECISION, Model, Stage, dip, equilibrium_near, slope, stage_at
 from cdsm.support.values import Array
 
 Kind = Literal["slack", "stop", "maximum", "law", "buckling"]
@@ -41,12 +33,8 @@ _WORDS: Final[dict[Kind, str]] = {
     "buckling": "the arm buckles, {} most",
 }
 _ROUNDING = 1e-9  # a quantity below this part of its scale is zero
-_NEAR = 1e-9  # distance of both sides of an event, as a part of the step
-_JUMP = 1e4  # a quantity jumps at an event if it changes there by more than so many roundings
 _ALONG = 1e-9  # 1 − cosine of the largest angle between a weight and gravity
 _DEPTH = 4  # most halvings of a step in which a quantity may dip below zero
-_RATE = 1e-6  # change of the share for a difference
-_PRECISION = 1e-15  # of shares, relative to their step
 
 
 @final
@@ -112,14 +100,12 @@ def watched(arm: LockedArm, maximum: Array | None = None) -> Watched:
     most = np.array([cable.maximum for cable in cables]) if maximum is None else maximum
     laws = [cable.elasticity for cable in cables]
     held = cables.position_controlled & (not arm.tension_held)
-    stretched = np.flatnonzero(held)
     limited = np.flatnonzero(np.isfinite(most))
     low = np.array([law.low for law in laws])
     high = np.array([law.high for law in laws])
     begun = np.flatnonzero(held & (low > 0.0))
     ended = np.flatnonzero(held & np.isfinite(high))
     cables_of: tuple[tuple[Kind, NDArray[np.intp]], ...] = (
-        ("slack", stretched),
         ("maximum", limited),
         ("law", begun),
         ("law", ended),
@@ -135,7 +121,7 @@ def watched(arm: LockedArm, maximum: Array | None = None) -> Watched:
         locked = stage.arm
         F = locked.continued_tensions(stage.pose)
         gaps = stage.balance.gaps(stage.point.x).ravel()[stops]
-        parts = F[stretched], (most - F)[limited], (F - low)[begun], (high - F)[ended], gaps
+        parts = (most - F)[limited], (F - low)[begun], (high - F)[ended], gaps
         return np.concatenate(parts)
 
     def scale(stage: Stage) -> Array:
@@ -162,13 +148,40 @@ def events_on(
     [N] is the growing force at the share 1.
     """
     events = list[Event]()
+    names = branch[0].pose.arm.cables.names
+    if branch[0].taut is not None:
+        taut = branch[0].arm.continued_tensions(branch[0].pose) >= 0.0
+        events += _gone_slack(names, taut, branch[0], force)
     for here, there in pairwise(branch):
-        events += _within(model, here, there, watch, force)
+        if there.snapped:
+            events.append(_loss(here, force))
+        else:
+            events += _within(model, here, there, watch, force)
+        if here.taut is not None:
+            events += _gone_slack(names, here.taut, there, force)
     last = branch[-1]
     if last.share < goal:
-        events += _at_end(model, last, watch, force)
+        events.append(_loss(last, force))
     order = sorted(events, key=lambda event: (event.share, event.kind == "buckling"))
     return tuple(replace(event, load=abs(event.load)) for event in order)
+
+
+def _gone_slack(
+    names: Sequence[str], before: NDArray[np.bool_], stage: Stage, force: float
+) -> list[Event]:
+    """Return the events of the cables that are no longer taut from a stage on."""
+    assert stage.taut is not None
+    gone = np.flatnonzero(before & ~stage.taut).tolist()
+    return [Event("slack", names[c], stage.share, stage.share * force) for c in gone]
+
+
+def _loss(stage: Stage, force: float) -> Event:
+    """Return the loss of stability at the end of a branch."""
+    taut = stage.taut
+    assert taut is not None
+    K = stage.arm.keeping(taut).at_pose(stage.pose).stiffness
+    joint = buckling_joint(K, stage.point.out, stage.pose.arm.joint_names)
+    return Event("buckling", joint, stage.share, stage.share * force)
 
 
 def events_under(arm: LockedArm, load: Array, maximum: Array) -> tuple[Event, ...]:
@@ -186,22 +199,9 @@ def events_under(arm: LockedArm, load: Array, maximum: Array) -> tuple[Event, ..
     return events_on(model, branch, watched(arm, maximum), force, 1.0)
 
 
-def _at_end(model: Model, last: Stage, watch: Watched, force: float) -> list[Event]:
-    """Return the events from the last stable equilibrium of a branch to its end, and this one."""
-    names = last.pose.arm.cables.names
-    end = end_of_branch(model, last)
-    stage = last if end is None else end.stage
-    slack = [] if end is None else end.slack
-    events = [Event("slack", names[c], share, share * force) for c, share in slack]
-    joint = buckling_joint(stage.point, stage.pose.arm.joint_names)
-    share = max(stage.share, last.share)
-    return [*events, Event("buckling", joint, share, share * force)]
-
-
-def buckling_joint(point: Point, names: Sequence[str]) -> str:
-    """Return the joint that moves most in the softest motion of the joints off their stops."""
-    K = point.state.stiffness
-    free = np.flatnonzero(~point.out)
+def buckling_joint(K: Array, out: NDArray[np.bool_], names: Sequence[str]) -> str:
+    """Return the joint that moves most in the softest motion of the joints that are not ``out``."""
+    free = np.flatnonzero(~out)
     if not free.size:
         free = np.arange(len(K))
     motion = np.linalg.eigh((K + K.T)[np.ix_(free, free)])[1][:, 0]
@@ -251,45 +251,19 @@ def _crossings(
         share = low
         if before[i] > none[i]:
             share = brentq(
-                lambda way, i=i: values(way)[i], low, high, xtol=_PRECISION * (high - low)
+                lambda way, i=i: values(way)[i], low, high, xtol=PRECISION * (high - low)
             )
         events.append(Event(watch.kinds[i], watch.places[i], share, share * force))
-        sides = [max(low, share - _NEAR * (high - low)), min(high, share + _NEAR * (high - low))]
-        if abs(np.diff([values(side)[i] for side in sides])[0]) > _JUMP * none[i]:
-            stage = at(sides[0])  # K_θ without the tension of this cable holds the arm no more
-            joint = buckling_joint(stage.point, stage.pose.arm.joint_names)
-            events.append(Event("buckling", joint, share, share * force))
     return events
 
 
 def _dip(model: Model, here: Stage, there: Stage, watch: Watched) -> float | None:
-    """Return a share between two equilibria at which a quantity may be negative, or None.
-
-    The quantities are positive at both ends; within, they are the cubics with their slopes.
-    """
+    """Return a share between two equilibria at which a quantity may be negative, or None."""
     step = there.share - here.share
-    values = [watch.value(here), watch.value(there)]
-    positive = (values[0] > 0.0) & (values[1] > 0.0)
-    if not positive.any():
+    if not ((watch.value(here) > 0.0) & (watch.value(there) > 0.0)).any():
         return None
-    slopes = [_slope(model, stage, watch) * step for stage in (here, there)]
-    suspects = positive & (slopes[0] < 0.0) & (slopes[1] > 0.0)
-    parts = np.linspace(0.0, 1.0, 21)[1:-1, None]
-    cubic = (
-        (1.0 + 2.0 * parts) * (1.0 - parts) ** 2 * values[0]
-        + parts * (1.0 - parts) ** 2 * slopes[0]
-        + parts**2 * (3.0 - 2.0 * parts) * values[1]
-        + parts**2 * (parts - 1.0) * slopes[1]
-    )
-    deep = np.where(suspects, cubic, np.inf).min(axis=1)
-    k = int(deep.argmin())
-    return here.share + float(parts[k, 0]) * step if deep[k] < 0.0 else None
-
-
-def _slope(model: Model, stage: Stage, watch: Watched) -> Array:
-    """Compute the derivatives (m,) of the quantities by the share along the branch."""
-    x = stage.point.x + _RATE * rate(model, stage)
-    arm = model(stage.share + _RATE)
-    balance = stage.balance.under(arm.at)
-    ahead = Stage(stage.share + _RATE, balance(x), balance, arm)
-    return (watch.value(ahead) - watch.value(stage)) / _RATE
+    first, last = [
+        (watch.value(end), step * slope(model, end, watch.value)) for end in (here, there)
+    ]
+    part = dip(first, last)
+    return None if part is None else here.share + part * step

@@ -14,11 +14,12 @@ from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.loads import LoadsLike, loads_of
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.continuation import Model, follow, stage_at
+from cdsm.statics.continuation import follow
 from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, settled, with_forced
 from cdsm.statics.events import events_on, watched
 from cdsm.statics.load_cycle import Approach, approach
 from cdsm.statics.locked_arm import LockedArm
+from cdsm.statics.pieces import Model, stage_at
 from cdsm.statics.quasi_static import QuasiStaticArm
 from cdsm.stiffness_matrix import checked_tension
 from cdsm.support.format import place, plural
@@ -125,10 +126,9 @@ def forward_statics(
     force = sum(float(np.linalg.norm(load.wrench[:3])) for load in as_loads(W).loads)
     events = events_on(model, branch, watched(model(0.0)), force, 1.0)
     last = branch[-1]
-    reached = 1.0
+    reached = min((event.share for event in events if event.kind == "buckling"), default=1.0)
     here = last.point
     if last.share < 1.0:
-        reached = events[-1].share
         here = settled(loaded, last.pose, reached)
     return as_equilibrium(loaded, here, reached, events)
 

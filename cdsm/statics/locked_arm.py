@@ -19,6 +19,7 @@ from cdsm.terms import ConstantPull, Stretch, stiffness_of, torque_of, torque_si
 from cdsm.wires.elasticity import Elasticity, newton_in_bracket
 
 _ROUNDING = 1e-9  # a tension outside the domain of a law by at most this part is rounding
+_LENGTH_ROUNDING = 1e-13  # of a length, relative
 _HUGE = 1e12  # no tension [N] is beyond
 
 Selection = slice | NDArray[np.intp]
@@ -108,6 +109,19 @@ class LockedArm:
         for held in self._laws:
             F[held.cables] = held.continued_tension(pose.cable_lengths[held.cables])[0]
         return F
+
+    @property
+    def locks(self) -> NDArray[np.bool_]:
+        """Whether the motor of each cable holds its wire (C,), not its tension."""
+        locked = np.zeros(self.tension.size, dtype=np.bool_)
+        for held in self._laws:
+            locked[held.cables] = True
+        return locked
+
+    def tension_rounding(self, pose: Posture) -> Array:
+        """Return what rounding of the lengths does to the tensions (C,) [N]."""
+        k = self.keeping(np.ones(self.tension.size, dtype=np.bool_))._tensions(pose)[1]
+        return np.asarray(_LENGTH_ROUNDING * k * pose.cable_lengths)
 
     def keeping(self, taut: NDArray[np.bool_]) -> LockedArm:
         """Return the arm whose cables stay taut, and could push, or stay slack, as ``taut`` (C,).

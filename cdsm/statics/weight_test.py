@@ -15,11 +15,12 @@ from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.loads import LoadsLike, link_point
 from cdsm.posture import Posture
-from cdsm.statics.continuation import Model, Stage, equilibrium_near, follow, stage_at
+from cdsm.statics.continuation import follow
 from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, equilibrium
 from cdsm.statics.events import Event, Watched, events_on, events_text, mass_of, watched
 from cdsm.statics.load_cycle import LoadHistory, follow_loads
 from cdsm.statics.locked_arm import LockedArm
+from cdsm.statics.pieces import Model, Stage, equilibrium_near, stage_at
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import coordinates, plural, stiffness_text, without_rounding
@@ -329,11 +330,11 @@ def weight_test(
     size = float(np.linalg.norm(force))
     watch = watched(unloaded.model)
     here = stage_at(model, unloaded.pose, unloaded.stop_torque, 0.0)
-    branch = [here]
+    branch = list[Stage]()
     for i in range(steps):
         goal = (i + 1) / steps
         way = follow(model, here, goal)
-        branch += way[1:]
+        branch += way[1:] if branch else way
         here = way[-1]
         if here.share < goal:
             raise _buckled(model, branch, watch, force)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.statics.continuation import end_of_branch, follow, stage_at
+from cdsm.statics.continuation import follow
 from cdsm.statics.events import Event
 from cdsm.statics.locked_arm import LockedArm
+from cdsm.statics.pieces import stage_at
 from cdsm.statics.solve import least_eigenvalue
 from cdsm.support.values import Array
 from tests.support.arms import random_arm
@@ -89,17 +90,17 @@ def check_root(
     else:
         i = arm.joint_names.index(event.place)
         torque = rest.stiffness.residual[i]
-        assert abs(torque) <= 1e-7 * abs(rest.tension @ pose.length_jacobian).max()
+        assert abs(torque) <= 1e-8 * abs(rest.tension @ pose.length_jacobian).max()
 
 
-@pytest.mark.parametrize("seed", [4, 8, 21])
+@pytest.mark.parametrize("seed", [3, 4, 18, 21, 28])
 def test_each_event_lies_within_one_step_of_a_scan(seed: int) -> None:
     assert check_against_scan(seed, 40)
 
 
 @pytest.mark.long
 def test_each_event_of_thirty_arms_lies_within_one_step_of_a_fine_scan() -> None:
-    assert sum(check_against_scan(seed, 1000) for seed in range(30)) > 60
+    assert sum(check_against_scan(seed, 2000) for seed in range(30)) > 60
 
 
 @pytest.mark.parametrize("seed", [4, 5, 19, 23])
@@ -117,14 +118,18 @@ def test_buckling_is_where_the_smallest_eigenvalue_is_zero(seed: int) -> None:
         return LockedArm(pose, tension.values, part * np.append(force, np.zeros(3)))
 
     branch = follow(model, stage_at(model, pose, np.zeros(pose.q.size), 0.0), 1.0)
-    end = end_of_branch(model, branch[-1])
-    assert end is not None
-    stage = end.stage
+    stage = branch[-1]
     assert stage.share == pytest.approx(share, rel=1e-9)
     margin = least_eigenvalue(stage.balance, stage.point)
     tensions = stage.arm.continued_tensions(stage.pose)
-    if end.slack and abs(tensions[end.slack[-1][0]]) <= 1e-8 * tensions.max():
-        assert margin <= 0.0  # K_θ jumps where a cable goes slack
+    assert stage.taut is not None
+    just = ~stage.taut & (abs(tensions) <= 1e-8 * tensions.max())
+    if just.any():  # K_θ jumps where a cable goes slack
+        K_before, K_after = (
+            stage.arm.keeping(taut).at_pose(stage.pose).stiffness
+            for taut in (stage.taut | just, stage.taut)
+        )
+        assert np.linalg.eigvalsh(K_before)[0] > 0.0 > np.linalg.eigvalsh(K_after)[0]
     else:
         assert abs(margin) <= 1e-8 * abs(np.linalg.eigvalsh(stage.point.state.stiffness)).max()
 
