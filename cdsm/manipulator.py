@@ -167,8 +167,9 @@ class Manipulator(ComputedArm):
             path: The file; :meth:`write` writes one.
             wire: Wire of all cables, instead of the wires in the file: a law, a name, EA [N], or
                 the path of a file of :meth:`Elasticity.write`.
-            changes: Values to lay over the keys of the file: ``{"minimum": 5.0, "universal":
-                {"link_mass": 0.06}}``. Cables and sections of a list go by name, or number from 1.
+            changes: Values to lay over the keys of the file, as --set of the commands:
+                ``{"minimum": 5.0, "universal.link_mass": 0.06}``, or tables in tables. Cables and
+                sections of a list go by name, or number from 1.
 
         Raises:
             FileError: The file cannot be read or does not describe an arm. Every fault is listed.

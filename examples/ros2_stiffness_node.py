@@ -2,11 +2,17 @@
 
     cdsm export ARM.toml arm.urdf          # for robot_state_publisher
     python ros2_stiffness_node.py --ros-args -p arm:=ARM.toml -p least_tension:=10.0
+    python ros2_stiffness_node.py --ros-args -p cables:=CABLES.toml -p tip:=tool0
+
+The second form takes the robot from the topic robot_description, and adds the cables of a file.
 
 It runs in a shell with ROS 2 sourced, in an environment that sees rclpy (`python -m venv
 --system-site-packages`). Topics:
 
     joint_states   sensor_msgs/JointState           in; in any order, with other joints or without
+    robot_description                std_msgs/String  in, if no arm is given: the URDF
+    /cable_controller/commands       std_msgs/Float64MultiArray  tensions [N] in the arm's order,
+                                     as a forward_command_controller of ros2_control reads them
     ~/tensions     sensor_msgs/JointState           effort: least tensions that balance the arm [N]
     ~/margin       std_msgs/Float64                 smallest eigenvalue of K_θ [N m/rad]
     ~/ellipsoid    visualization_msgs/Marker        where 1 N at the tip moves it
@@ -19,6 +25,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -73,6 +81,14 @@ def answer(arm: cdsm.Manipulator, positions: Mapping[str, float], least_tension:
     return Answer(tensions, K.margin, tip, np.maximum(axes, 0.0).tolist(), quaternion, "")
 
 
+def arm_of_description(urdf: str, cables: str, tip: str) -> cdsm.Manipulator:
+    """Return the arm of the text of a URDF, with the cables of a file CABLES.toml."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "robot.urdf")
+        path.write_text(urdf, encoding="utf-8")
+        return cdsm.Manipulator.from_urdf(path, tip=tip, cables=cables)
+
+
 def _unknown(tip: Sequence[float], problem: str) -> Answer:
     return Answer({}, math.nan, tip, [0.0] * 3, [0.0, 0.0, 0.0, 1.0], problem)
 
@@ -82,24 +98,41 @@ def main() -> None:
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
     from rclpy.node import Node
+    from rclpy.qos import DurabilityPolicy, QoSProfile
     from sensor_msgs.msg import JointState
-    from std_msgs.msg import Float64
+    from std_msgs.msg import Float64, Float64MultiArray, String
     from visualization_msgs.msg import Marker
 
     class StiffnessNode(Node):  # type: ignore[misc]
         def __init__(self) -> None:
             super().__init__("cdsm_stiffness")
-            self.declare_parameter("arm", "ARM.toml")
+            self.declare_parameter("arm", "")
+            self.declare_parameter("cables", "CABLES.toml")
+            self.declare_parameter("tip", "tool0")
+            self.declare_parameter("controller", "/cable_controller")
             self.declare_parameter("least_tension", 10.0)
             self.declare_parameter("frame", "base_link")
             self.declare_parameter("scale", 100.0)  # drawn over true size of the ellipsoid
-            self.arm = cdsm.Manipulator.read(self.get_parameter("arm").value)
-            # the first answer compiles kernels, once on a machine: before messages come
-            answer(self.arm, dict.fromkeys(self.arm.joint_names, 0.0), self.value("least_tension"))
+            commands = self.value("controller") + "/commands"
+            self.commands = self.create_publisher(Float64MultiArray, commands, 1)
             self.tensions = self.create_publisher(JointState, "~/tensions", 1)
             self.margin = self.create_publisher(Float64, "~/margin", 1)
             self.ellipsoid = self.create_publisher(Marker, "~/ellipsoid", 1)
             self.diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 1)
+            self.arm: cdsm.Manipulator | None = None
+            if path := self.value("arm"):
+                self.start(cdsm.Manipulator.read(path))
+            else:  # robot_state_publisher says it once; who comes later gets it, too
+                kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+                self.create_subscription(String, "robot_description", self.describe, kept)
+
+        def describe(self, description: Any) -> None:
+            if self.arm is None:
+                files = self.value("cables"), self.value("tip")
+                self.start(arm_of_description(description.data, *files))
+
+        def start(self, arm: cdsm.Manipulator) -> None:
+            self.arm = arm
             self.create_subscription(JointState, "joint_states", self.answer, 1)
 
         def value(self, name: str) -> Any:
@@ -111,6 +144,8 @@ def main() -> None:
             tensions = JointState(name=list(said.tensions), effort=list(said.tensions.values()))
             tensions.header.stamp = state.header.stamp
             self.tensions.publish(tensions)
+            if said.tensions:
+                self.commands.publish(Float64MultiArray(data=list(said.tensions.values())))
             self.margin.publish(Float64(data=said.margin))
             self.ellipsoid.publish(self.marker(said, state.header.stamp))
             status = DiagnosticStatus(

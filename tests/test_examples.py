@@ -6,7 +6,7 @@ import generate
 import mujoco_weight
 import numpy as np
 import pytest
-from ros2_stiffness_node import answer
+from ros2_stiffness_node import answer, arm_of_description
 from scipy.spatial.transform import Rotation
 
 import cdsm
@@ -41,6 +41,17 @@ def test_the_ros_node_names_what_is_wrong() -> None:
         assert first in said.problem
         assert not said.tensions
     assert answer(ARM, straight, 1e5).problem
+
+
+def test_the_ros_node_takes_the_robot_of_robot_description(tmp_path: Path) -> None:
+    arm = cdsm.presets.virtual_prototype()
+    cables = cdsm.write_cables(arm.cables, tmp_path / "CABLES.toml")
+    urdf = (EXAMPLES.parent / "urdf" / "virtual_prototype.urdf").read_text()
+    described = arm_of_description(urdf, str(cables), "tool0")
+    straight = dict.fromkeys(arm.joint_names, 0.0)
+    assert answer(described, straight, 10.0).margin == pytest.approx(
+        answer(arm.with_gravity(described.gravity), straight, 10.0).margin, rel=1e-9
+    )
 
 
 def test_mujoco_comes_to_rest_where_cdsm_says() -> None:

@@ -64,7 +64,12 @@ def _read_tables(
     if robot and text.lstrip("\ufeff \t\r\n").startswith("<"):
         problem = next(problem for sign, problem in _OTHERS.items() if sign in text)
         raise FileError(path, problem.format(path=path))
-    tables: dict[str, Any] = laid_over(read_toml(text), changes or {})
+    tables: dict[str, Any] = read_toml(text)
+    for key, value in (changes or {}).items():
+        change = value
+        for name in reversed(str(key).split(".")):
+            change = {name: change}
+        tables = laid_over(tables, change)
     cables = tables.get("cables")
     cable_tables = [*cables.values()] if isinstance(cables, dict) else cables
     for table in (tables, *(cable_tables if isinstance(cable_tables, list) else ())):

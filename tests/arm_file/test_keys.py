@@ -15,6 +15,7 @@ from cdsm.tolerances import sources
 
 DOCS = Path(__file__).parents[2] / "docs"
 SNAKE = Path(__file__).parents[1] / "data" / "snake.toml"
+EXAMPLE = Path(__file__).parents[2] / "examples" / "arm.toml"
 
 
 def test_the_page_has_every_key() -> None:
@@ -38,3 +39,10 @@ def test_a_key_beside_its_table_is_told_where_it_belongs() -> None:
         cdsm.Manipulator.read(SNAKE, changes={"minimun": 5})
     with pytest.raises(cdsm.FileError, match="only 1, 2; tables are counted from 1"):
         cdsm.Manipulator.read(SNAKE, changes={"sections": {"0": {"phase": 0.1}}})
+
+
+def test_changes_take_tables_or_keys_with_dots() -> None:
+    nested = cdsm.Manipulator.read(EXAMPLE, changes={"universal": {"hole_radius": 0.03}})
+    dotted = cdsm.Manipulator.read(EXAMPLE, changes={"universal.hole_radius": 0.03, "minimum": 4.0})
+    assert dotted.geometry == nested.geometry
+    assert dotted.cables[0].minimum == 4.0
