@@ -68,6 +68,9 @@ from cdsm.planning.range import stiffness_range as stiffness_range
 from cdsm.planning.sensitivity import saturation as saturation
 from cdsm.planning.sensitivity import stiffness_gradient as stiffness_gradient
 from cdsm.posture import Posture as Posture
+from cdsm.springs import SpringLaw as SpringLaw
+from cdsm.springs.fit import fit_spring as fit_spring
+from cdsm.springs.fit import read_spring_csv as read_spring_csv
 from cdsm.statics.buckling import critical_load as critical_load
 from cdsm.statics.buckling import critical_tension as critical_tension
 from cdsm.statics.equilibrium import equilibrium as equilibrium

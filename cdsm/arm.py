@@ -15,7 +15,7 @@ from cdsm.cable_laws import CableLaws
 from cdsm.definition import ArmDefinition
 from cdsm.errors import InvalidInput, warn
 from cdsm.geometry import Geometry
-from cdsm.joints import Springs, springs_of
+from cdsm.joint_springs import SpringOfJoint, Springs, springs_of
 from cdsm.limits import beyond_limits, require_within_limits
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import SHORTEST_SEGMENT, Routing
@@ -26,6 +26,8 @@ from cdsm.support.validation import flag, vector
 from cdsm.support.values import Array, Printed, frozen
 from cdsm.tolerances import Tolerances
 from cdsm.wraps import Wraps, placed
+
+_FAR = 2.0 * math.pi  # angles [rad] or ways [m] up to which functions of springs are checked
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -39,7 +41,7 @@ class ComputedArm(Printed):
         body: Its rigid bodies, joints and limits.
         springs: Springs at the joints: ``springs.stiffness`` k (n,) [N m/rad] and
             ``springs.angle`` q_0 (n,) [rad], at which they have no torque; of all n joints, also
-            those that follow others.
+            those that follow others. Of a spring with a law, k is the tangent at q_0.
         wraps: Cables over pulleys; None: there are none.
         routing: Sites and segments of the cables; contacts with all pulleys, if there are any.
         laws: Elasticities of the cables.
@@ -253,11 +255,17 @@ class ComputedArm(Printed):
 
 def _springs(
     definition: ArmDefinition, body: RigidBody
-) -> tuple[Springs, dict[str, tuple[float, float]] | None]:
+) -> tuple[Springs, dict[str, SpringOfJoint] | None]:
     """Return the springs, and by joint those that change the springs of the geometry, if any."""
     geometry = definition.geometry
     usual = geometry.springs if geometry else {}
     values = usual if definition.springs is None else definition.springs
-    springs = springs_of(values, body.all_joints, body.coupling)
-    changed = None if springs.given == usual else dict.fromkeys(usual, (0.0, 0.0)) | springs.given
-    return springs, changed
+    lower, upper = np.clip([body.lower, body.upper], -_FAR, _FAR)  # some joints have no limits
+    ends = (lower, upper)
+    if body.coupling:
+        ends = body.coupling.angles(lower), body.coupling.angles(upper)
+    springs = springs_of(values, body.all_joints, body.coupling, body.all_units, ends)
+    if springs.given == usual:
+        return springs, None
+    none: dict[str, SpringOfJoint] = dict.fromkeys(usual, (0.0, 0.0))
+    return springs, {**none, **springs.given}

@@ -23,7 +23,8 @@ class ArmParameters:
     """Arm as a function of some of its parameters; use it as ``model_of`` of :func:`identify`.
 
     - ``hole_radius``, ``disk_offset`` [m] of a joint; ``link_length`` [m], ``link_mass`` [kg] of
-      the link after it; ``joint_stiffness`` [N m/rad] of the springs about its axes.
+      the link after it; ``joint_stiffness`` [N m/rad] of the springs about its axes, which scales a
+      law as a whole, and ``exponent`` [-] of a law :meth:`SpringLaw.power`.
     - ``bending_stiffness`` EI [N m²] of a neck, a gap of a backbone or a link that bends; its GJ
       changes in the same ratio.
     - Of a cable: ``lead`` [m], ``hole_angle`` [rad], ``friction`` μ [-] in its holes, ``spring``

@@ -12,7 +12,7 @@ from cdsm.cable import Cable, Cables
 from cdsm.cable_path import positions
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry import Geometry
-from cdsm.joints import Spring
+from cdsm.joint_springs import Spring
 from cdsm.rigid_body import GRAVITY, RigidBody
 from cdsm.support.validation import (
     LONGEST,

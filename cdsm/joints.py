@@ -1,24 +1,20 @@
-"""Joints that follow others, and springs at joints.
+"""Joints that follow others.
 
 A joint of a URDF that mimics another one has θ = multiplier · θ_leader + offset. So the angles of
 all joints are θ = S q + θ_0 with a constant S: torques become Sᵀ τ and stiffness Sᵀ K S, without
-further terms. S also permutes joints whose order the user chose. A spring turns a joint back to its
-angle q_0 by k (θ − q_0).
+further terms. S also permutes joints whose order the user chose.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from lxml import etree
 
 from cdsm.errors import GeometryError, InvalidInput, listed
-from cdsm.support.validation import one_of, scalar, within
 from cdsm.support.values import Array, frozen
 
 _LOGGED = math.radians(1.0)  # largest error of a logged follower [rad]
@@ -142,84 +138,3 @@ def require_followers(
             )
             remedy = f"it at {expected[k]:.4g} [rad, m]. Leave the column out, or correct <mimic>."
             raise InvalidInput(name, problem + remedy)
-
-
-Spring = float | Sequence[float]
-"""Stiffness of a spring [N m/rad], or [N/m] at a prismatic joint; or (stiffness, free angle)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Springs:
-    """Springs of all n joints; nv of them are independent.
-
-    Attributes:
-        joints: Names of the joints in Pinocchio's order, those that follow others included.
-        stiffness: k (n,) [N m/rad], [N/m] for prismatic joints; 0: none.
-        angle: q_0 (n,) without torque [rad], [m] for prismatic joints.
-    """
-
-    joints: tuple[str, ...]
-    stiffness: Array
-    angle: Array
-    _coupling: Coupling | None = None
-
-    def torque(self, q: Array) -> Array:
-        """Compute the derivative of the energy ½ Σ k (θ − q_0)² by q (nv,) [N m]."""
-        if self._coupling is None:
-            return self.stiffness * (q - self.angle)
-        pulled = self.stiffness * (self._coupling.angles(q) - self.angle)
-        return np.asarray(pulled @ self._coupling.matrix)
-
-    def energy(self, q: Array) -> float:
-        """Compute ½ Σ k (θ − q_0)² [J]."""
-        angles = q if self._coupling is None else self._coupling.angles(q)
-        return float(0.5 * self.stiffness @ (angles - self.angle) ** 2)
-
-    @cached_property
-    def matrix(self) -> Array:
-        """Second derivative of the energy (nv, nv) [N m/rad]: diag k, or Sᵀ diag k S."""
-        K = np.diag(self.stiffness)
-        return frozen(self._coupling.square(K) if self._coupling else K)
-
-    @property
-    def given(self) -> dict[str, tuple[float, float]]:
-        """Stiffness and angle of each spring by the name of its joint."""
-        rows = zip(self.joints, self.stiffness.tolist(), self.angle.tolist(), strict=True)
-        return {name: (k, angle) for name, k, angle in rows if k or angle}
-
-    @property
-    def sprung(self) -> list[int]:
-        """Indices of the joints that have a spring."""
-        return np.flatnonzero(self.stiffness).tolist()
-
-    @cached_property
-    def rest(self) -> Array:
-        """Joint angles q (nv,) [rad] where the springs rest; 0 where there are none."""
-        if self._coupling is None:
-            return self.angle
-        S = self._coupling.matrix
-        root = np.sqrt(self.stiffness)
-        free = root * (self.angle - self._coupling.offset)
-        angles = np.linalg.lstsq(S * root[:, None], free, rcond=None)[0]
-        return frozen(np.asarray(angles, dtype=np.float64))
-
-
-def springs_of(springs: object, joints: tuple[str, ...], coupling: Coupling | None) -> Springs:
-    """Check springs by the name of their joint, and return those of all ``joints``.
-
-    Raises InvalidInput, also if there is no such joint.
-    """
-    if not isinstance(springs, Mapping):
-        problem = f"{springs!r} given; give a dict of joint names and stiffnesses [N m/rad]."
-        raise InvalidInput("springs", problem)
-    k = np.zeros(len(joints))
-    angle = np.zeros(len(joints))
-    for name, spring in springs.items():
-        j = joints.index(one_of("joint", name, joints))
-        pair = list(spring) if isinstance(spring, Sequence) else [spring, 0.0]
-        if len(pair) != 2:
-            raise InvalidInput(f"springs[{name!r}]", "give a stiffness, or (stiffness, angle).")
-        k[j], angle[j] = (scalar(f"springs[{name!r}]", number) for number in pair)
-        if fault := within("spring", k[j], zero=True):
-            raise InvalidInput(f"springs[{name!r}]", f"{fault}.")
-    return Springs(joints, frozen(k), frozen(angle), coupling)

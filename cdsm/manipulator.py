@@ -21,7 +21,7 @@ from cdsm.cable import Cable, serpentine_cables
 from cdsm.definition import ArmDefinition, Term
 from cdsm.errors import InvalidInput
 from cdsm.geometry import Geometry
-from cdsm.joints import Spring
+from cdsm.joint_springs import Spring
 from cdsm.posture import Posture
 from cdsm.rigid_body import GRAVITY
 from cdsm.support.files import write_text
@@ -65,7 +65,7 @@ class Manipulator(ComputedArm):
     Attributes:
         springs: Springs at the joints: ``springs.stiffness`` k (n,) [N m/rad] and
             ``springs.angle`` q_0 (n,) [rad], at which they have no torque; of all n joints, also
-            those that follow others.
+            those that follow others. Of a spring with a law, k is the tangent at q_0.
 
     Raises:
         InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, or gravity is
@@ -296,10 +296,12 @@ class Manipulator(ComputedArm):
 
         Args:
             springs: By the name of the joint: stiffness k [N m/rad], or [N/m] if it is prismatic;
-                or (k, q_0) with the angle [rad] or way [m] without torque, which is 0 otherwise.
+                or (k, q_0) with the angle [rad] or way [m] without torque, which is 0 otherwise;
+                or a :class:`~cdsm.SpringLaw`.
 
         Raises:
-            InvalidInput: A stiffness is negative, or no number. There is no such joint.
+            InvalidInput: A stiffness is negative, or no number. There is no such joint. A function
+                of a law fails or does not rise between the limits of the joint.
         """
         return self.replace(springs=springs)
 

@@ -14,6 +14,7 @@ from typing import Any, Final, Literal, NamedTuple, TypeVar
 from cdsm.cable import Cable
 from cdsm.geometry import CableRoute, Joint, Link
 from cdsm.quantities import DISPLAY
+from cdsm.springs import SpringLaw
 
 _Part = TypeVar("_Part")
 
@@ -102,11 +103,27 @@ def attribute(kind: PartKind, name: str, unit: Unit, **more: Any) -> Parameter:
 
 
 def _joint_stiffness(joint: Joint) -> float | None:
-    return joint.stiffness if joint.axes else None
+    """Return k of the spring about the axes of a joint; of a law, the tangent at rest."""
+    if not joint.axes:
+        return None
+    spring = joint.stiffness
+    return spring.stiffness_at_rest if isinstance(spring, SpringLaw) else spring
 
 
 def _with_joint_stiffness(joint: Joint, stiffness: float) -> Joint:
+    spring = joint.stiffness
+    if isinstance(spring, SpringLaw):
+        return replace(joint, stiffness=spring.scaled(stiffness / spring.stiffness_at_rest))
     return replace(joint, stiffness=stiffness)
+
+
+def _exponent(joint: Joint) -> float | None:
+    return joint.stiffness.exponent if isinstance(joint.stiffness, SpringLaw) else None
+
+
+def _with_exponent(joint: Joint, exponent: float) -> Joint:
+    assert isinstance(joint.stiffness, SpringLaw)
+    return replace(joint, stiffness=joint.stiffness.with_exponent(exponent))
 
 
 def _bending_stiffness(beam: Joint | Link) -> float | None:
@@ -165,6 +182,17 @@ PARAMETERS: Final[dict[str, Parameter]] = {
         is_relative=True,
         is_common=True,
         largest=0.5,
+    ),
+    "exponent": Parameter(
+        unit=NUMBER,
+        kinds=("joints",),
+        get=_exponent,
+        set=_with_exponent,
+        is_spring=True,
+        lacks="no joints there whose spring is a SpringLaw.power",
+        is_common=True,
+        largest=0.5,
+        usual=(0.3, 2.0),
     ),
     "lead": attribute("routes", "lead", METRE),
     "hole_radius": attribute("joints", "hole_radius", METRE),

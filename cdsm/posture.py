@@ -202,13 +202,18 @@ class Posture(ReadOnlyState):
         return tuple(overlapping(disks, {disk.link: poses[disk.link] for disk in disks}))
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What makes K_θ doubtful here: cables about to leave their pulleys, springs at rest."""
+        return *(self.wrapping.remarks if self.wrapping else ()), *self.arm.springs.doubts(self.q)
+
+    @property
     def remarks(self) -> tuple[str, ...]:
-        """What is doubtful here: links that overlap, and cables about to leave their pulleys."""
-        remarks = self.wrapping.remarks if self.wrapping else ()
+        """What is doubtful here: links that overlap, and :attr:`notes`."""
         pairs = [" and ".join(pair) for pair in self.self_contacts]
         if pairs:
-            remarks = (f"the arm passes through itself: {listed(pairs, 3, '; ')}", *remarks)
-        return remarks
+            overlap = f"the arm passes through itself: {listed(pairs, 3, '; ')}"
+            return overlap, *self.notes
+        return self.notes
 
     @cached_property
     def segments(self) -> Segments:

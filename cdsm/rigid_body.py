@@ -115,6 +115,7 @@ class RigidBody:
         self.tip_joints = frozen(np.array(to_tip, np.intp) - 1)
         self._twists = frozen(self._local_twists())
         slides = np.asarray(~self._twists[1:, 3:].any(axis=1))
+        self.all_units = tuple(np.where(slides, "m", "rad").tolist())
         self.slides = frozen(slides[list(self.coupling.leaders)] if self.coupling else slides)
 
     @property

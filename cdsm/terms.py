@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from cdsm.definition import Term
-from cdsm.joints import Springs
+from cdsm.joint_springs import Springs
 from cdsm.posture import Posture
 from cdsm.support.values import Array, total
 
@@ -47,7 +47,7 @@ class Gravity:
 
 @dataclass(frozen=True, eq=False)
 class JointSprings:
-    """Springs at the joints: U = ½ Σ k (θ − q_0)²."""
+    """Springs at the joints: U = Σ E(θ − q_0), ½ k (θ − q_0)² without laws."""
 
     springs: Springs
     name: ClassVar[str] = "springs"
@@ -57,12 +57,12 @@ class JointSprings:
         return self.springs.energy(pose.q)
 
     def torque(self, pose: Posture) -> Array:
-        """Compute k (θ − q_0) (nv,) [N m]."""
+        """Compute k (θ − q_0), or M of a law (nv,) [N m]."""
         return self.springs.torque(pose.q)
 
     def stiffness(self, pose: Posture) -> Array:
         """Return diag k, or Sᵀ diag k S of coupled joints (nv, nv) [N m/rad]."""
-        return self.springs.matrix
+        return self.springs.stiffness_at(pose.q)
 
 
 @dataclass(slots=True)

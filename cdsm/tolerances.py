@@ -97,7 +97,9 @@ class Tolerances:
     Args:
         rigidity: EA of the law of each cable; relative [-].
         spring: k_series in series with each cable, such as its anchor or drive; relative [-].
-        joint_stiffness: k of the spring of each joint, those of beams included; relative [-].
+        joint_stiffness: k of the spring of each joint, those of beams included; relative [-]. Of a
+            spring with a law, it is that of all torques.
+        exponent: Exponent of each spring with a law that is a power [-].
         bending_stiffness: EI of each neck, gap or link that bends; relative [-].
         joint_angle: Angle of each joint that turns [rad].
         joint_position: Coordinate of each joint that slides [m].

@@ -20,6 +20,8 @@ from cdsm.cable import SETTINGS, Cable, serpentine_cables
 from cdsm.cable_path import Site
 from cdsm.definition import ArmDefinition, refuse_terms
 from cdsm.errors import FileError, GeometryError, InvalidInput
+from cdsm.joint_springs import Spring
+from cdsm.springs import SpringLaw, law_table
 from cdsm.support.described import attributes_of, in_plain_text
 from cdsm.support.files import write_text
 from cdsm.support.records import one_line_each, toml_text, verbatim
@@ -149,7 +151,21 @@ _OTHERS: Final = ("geometry", "urdf", "cables", "wire", "original_length", "lead
 _KEYS: Final = tuple(key for key in ArmFile.__annotations__ if key not in _OTHERS)
 """Keys of a file that are attributes of an arm; its robot and its cables are more than one key."""
 
-_TABLES: Final[dict[str, Callable[[Any], Any]]] = {"tolerances": tolerance_table}
+
+def _spring_tables(springs: Mapping[str, Spring] | None) -> dict[str, Any] | None:
+    """Return the table [springs]; InvalidInput for a law that no file holds."""
+    if springs is None:
+        return None
+    return {
+        joint: law_table(spring, joint) if isinstance(spring, SpringLaw) else spring
+        for joint, spring in springs.items()
+    }
+
+
+_TABLES: Final[dict[str, Callable[[Any], Any]]] = {
+    "springs": _spring_tables,
+    "tolerances": tolerance_table,
+}
 
 
 def _as_it_is(value: Any) -> Any:

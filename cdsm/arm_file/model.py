@@ -20,6 +20,7 @@ from cdsm.cable import SETTINGS, Cable, Cables, serpentine_cables
 from cdsm.errors import LINES, FileError, GeometryError, listed, warn
 from cdsm.geometry import Geometry, toml
 from cdsm.rigid_body import GRAVITY
+from cdsm.springs import JointSpring
 from cdsm.support import records
 from cdsm.support.files import read_text
 from cdsm.support.records import EACH, ONE, CrossFaults, laid_over, read_toml, record
@@ -170,6 +171,10 @@ _Gravity = Annotated[
     AfterValidator(lambda value: gravity_vector("gravity", value)),
 ]
 _Law = Annotated[Any, PlainValidator(from_table)]
+_Spring = Annotated[
+    Annotated[JointSpring, Tag(ONE)] | Annotated[records.Numbers, Tag(EACH)],
+    Discriminator(records.one_or_each),
+]
 
 
 _CHECKS: Final = {"maximum": AfterValidator(_ordered)}  # of a key and those before it
@@ -302,7 +307,9 @@ class ArmFile(_Settings, _Wires):
         friction: Coefficient of friction in all holes [-].
         wires: Tables ``[wires.NAME]``, laws of wires: the lines of a file of ``cdsm fit``.
         springs: Stiffness of joints by name [N m/rad], ``joint1_1 = 2.0``; with the angle [rad] of
-            no torque ``[2.0, 0.1]``.
+            no torque ``[2.0, 0.1]``. Or a law: ``{stiffness = 0.56, exponent = 0.74, scale =
+            0.035}``, or points ``{angles = [0.1, 0.2], torques = [0.05, 0.08]}`` [rad, N m]; both
+            may have an ``angle`` of no torque.
         tolerances: Table of standard deviations, with a key for each source.
         urdf: Table of a robot that no generator makes.
         lead: Straight cable between actuator and first site [m], of all ``[[cables]]``.
@@ -314,7 +321,7 @@ class ArmFile(_Settings, _Wires):
     gravity: _Gravity = GRAVITY
     original_length: Annotated[Any, AfterValidator(_unstrained)] = None
     tolerances: Annotated[Tolerances, PlainValidator(tolerances_from)] = Tolerances()
-    springs: dict[str, records.PerJoint[records.Number]] | None = None
+    springs: dict[str, _Spring] | None = None
     geometry: Annotated[Any, PlainValidator(_described), Field(alias=_ROBOT)] = None
     urdf: Annotated[Urdf | None, AfterValidator(_alone)] = None
     lead: Annotated[records.LengthOrZero | None, AfterValidator(_of_routed)] = None

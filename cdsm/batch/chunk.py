@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from cdsm import readings
 from cdsm.batch.quantities import READINGS, Codes, read
 from cdsm.batch.rows import BodyArrays, PoseArrays, Rows, one_by_one, side_by_side, tables_of
+from cdsm.batch.spring_rows import SpringRows
 from cdsm.definition import TERMS_OF_K
 from cdsm.quantities import QUANTITIES
 from cdsm.readings import UNMOVED
@@ -68,6 +69,7 @@ class Chunk:
         self._width = width if kernels.COMPILED else len(self._q)
         lost = rows.status
         self.status: Codes = np.zeros(len(self._q), np.uint8) if lost is None else lost[part].copy()
+        self._springs: SpringRows | None = None  # of an arm with laws, set with the posture
 
     def quantities(self) -> dict[str, NDArray[Any]]:
         """Compute the quantities (n, …); NaN where one does not exist, as the status says."""
@@ -109,7 +111,15 @@ class Chunk:
         shapes = table.shapes.items()
         arrays = (self._scratch.empty(name, len(q), *shape, self._width) for name, shape in shapes)
         at = PoseArrays(*arrays)
-        self._kernels.fill_pose(table.arm, self._body(), q, W, at)
+        body = self._body()
+        given = self._rows.body
+        k = table.dimensions.spring if given is None else given.spring[self._part]
+        self._springs = laws = SpringRows.at(self._rows.arm.springs, angles, k)
+        if laws:
+            body = body._replace(spring=frozen(body.spring * laws.linear[:, None]))
+        self._kernels.fill_pose(table.arm, body, q, W, at)
+        if laws:
+            np.subtract(at.torque, side_by_side(laws.torque, self._width), out=at.torque)
         return at
 
     def _by_independent_joints(self, at: PoseArrays) -> PoseArrays:
@@ -253,7 +263,7 @@ class Chunk:
         self, at: PoseArrays, F: Array, k: Array, W: Array
     ) -> tuple[dict[str, Array], Array]:
         """Compute K_θ and ``along`` without the terms, and pivots (n,): where small, not exact."""
-        K, size = self._stiffness(at, self._body(), F, k, W, 1)
+        K, size = self._stiffness(at, self._body_with_tangents(), F, k, W, 1)
         values = {"joint": self._one_by_one(K[:, 0]).copy()} if "joint" in self._names else {}
         pivot = np.zeros((len(F), self._width))
         if "along" in self._names:
@@ -268,7 +278,7 @@ class Chunk:
         self, at: PoseArrays, F: Array, k: Array, W: Array, rows: Indices | None = None
     ) -> Array:
         """Return the 4 or 5 terms (n, 5, nv, nv) of K_θ of some rows, or of all."""
-        body = self._body()
+        body = self._body_with_tangents()
         number = len(self._q)
         coupling = self._table.coupling
 
@@ -283,6 +293,8 @@ class Chunk:
             number = rows.size
             if self._rows.body is not None:
                 body = BodyArrays(*(frozen(some(x)) for x in body))
+            elif self._springs:
+                body = body._replace(spring=frozen(some(body.spring)))
         count = 5 if self._rows.arm.has_springs or "springs" in self._names else 4
         terms = one_by_one(self._stiffness(at, body, F, k, W, count)[0], number)
         return coupling.square(terms) if coupling else terms
@@ -332,6 +344,13 @@ class Chunk:
             return self._table.body(self._width if self._kernels.COMPILED else 1)
         blocks = (side_by_side(x[self._part], self._width) for x in self._rows.body)
         return BodyArrays(*map(frozen, blocks))
+
+    def _body_with_tangents(self) -> BodyArrays:
+        """Return the dimensions; springs with laws have their tangents in each row."""
+        if self._springs is None:
+            return self._body()
+        k = side_by_side(self._springs.tangent, self._width)
+        return self._body()._replace(spring=frozen(k))
 
     def _blocks(self, x: Array) -> Array:
         """Put the rows of an array side by side, or repeat its only row."""

@@ -63,7 +63,7 @@ class BodyArrays(NamedTuple):
     tip: Array  # (B, 3, W) [m]
     mass: Array  # (B, n+1, W) [kg]
     fixed: Array  # length of cables that no joint changes (B, C, W) [m]
-    spring: Array  # stiffness of the spring of each joint (B, n, W)
+    spring: Array  # stiffness of the spring of each joint, or the factor on its law (B, n, W)
 
 
 class PoseArrays(NamedTuple):
@@ -188,7 +188,7 @@ class ArmTables:
             tip=tree.tip_point,
             mass=tree.mass,
             fixed=routing.fixed,
-            spring=arm.springs.stiffness,
+            spring=arm.springs.coefficients,
         )
         self.body = cache(self._body)
         C = len(arm.cables)

@@ -23,7 +23,12 @@ if TYPE_CHECKING:
     from cdsm.identification import Identification
 
 _TEST = "Tensile test, a line per reading. Columns: displacement (or extension, stroke, strain, …) "
-_TEST += "[mm] and force (or load) [N], in the order recorded; as examples/data/TEST.csv."
+_TEST += "[mm] and force (or load) [N], in the order recorded; as examples/data/TEST.csv. With "
+_TEST += "--spring, columns angle [deg] and torque [N m], as examples/data/SPRING.csv."
+_SPRING = "Fit the law of a joint's spring to torques at angles instead."
+_SCALE = (
+    "With --spring: angle below which the spring is linear; it is given, not found. Default: 2."
+)
 
 
 def fit(
@@ -33,21 +38,31 @@ def fit(
     ] = None,
     columns: Annotated[str | None, opt("Of displacement (or strain), force.", "NAME,NAME")] = None,
     units: Annotated[str | None, opt("Of both, if the file has none: mm,N.", "UNIT,UNIT")] = None,
-    between: Annotated[str | None, opt("Forces to fit [N], on the last rise.", "LOW,HIGH")] = None,
+    between: Annotated[
+        str | None, opt("Forces to fit [N], on the last rise; angles [deg].", "LOW,HIGH")
+    ] = None,
+    spring: Annotated[bool, opt(_SPRING, None, "--spring")] = False,
+    scale: Annotated[float | None, opt(_SCALE, "DEG")] = None,
     out: Annotated[
         Path | None, file_opt("Law, for wire= in ARM.toml.", "FILE.toml", "--out")
     ] = None,
     figure: FigureOption = None,
     as_json: JsonOption = False,
 ) -> int:
-    """Fit the law EA(F) of a wire to its tensile test.
+    """Fit the law EA(F) of a wire to its tensile test, or that of a spring to its torques.
 
     TEST.csv may be the text file of a testing machine: with lines of titles, decimal commas, or a
     line of units.
     """
     limits = [-math.inf, math.inf]
     if between is not None:
-        limits = options.parse_numbers("--between", between, (2,), "LOW,HIGH in N")
+        form = f"LOW,HIGH in {'degrees' if spring else 'N'}"
+        limits = options.parse_numbers("--between", between, (2,), form)
+    if spring:
+        _refuse_of_wires(gauge_length=gauge_length, columns=columns, units=units, out=out)
+        return _fit_spring(test, scale, limits, figure, as_json)
+    if scale is not None:
+        raise misuse("--scale", "belongs to --spring.")
     data = cdsm.read_tensile_csv(
         test,
         columns=_pair("--columns", columns),
@@ -68,6 +83,34 @@ def fit(
         "notes": fitted.notes,
     }
     return answer(as_json, read | fitted.to_dict(), f"{test}: {data.source}\n{fitted}")
+
+
+def _refuse_of_wires(**given: object) -> None:
+    """Refuse options that only tensile tests have."""
+    remedies = {
+        "gauge_length": "a spring has none",
+        "columns": "call the columns angle [deg] and torque [N m]",
+        "units": "give them in the header: angle [deg], torque [mN m]",
+        "out": "the law of a spring is a line of ARM.toml, which is printed",
+    }
+    for name, value in given.items():
+        if value is not None:
+            raise misuse(f"--{name.replace('_', '-')}", f"is not for --spring: {remedies[name]}.")
+
+
+def _fit_spring(
+    test: Path, scale: float | None, limits: list[float], figure: Path | None, as_json: bool
+) -> int:
+    """Fit the law of a spring; ``scale`` and ``limits`` are in degrees."""
+    from cdsm.springs.fit import SCALE
+
+    angles, torques = cdsm.read_spring_csv(test)
+    a = SCALE if scale is None else math.radians(scale)
+    ends = math.radians(limits[0]), math.radians(limits[1])
+    fitted = cdsm.fit_spring(angles, torques, scale=a, between=ends)
+    write_picture(figure, fitted.plot)
+    law = {"law": fitted.law.shape.arguments, "notes": fitted.notes}
+    return answer(as_json, law | fitted.to_dict(), f"{test}\n{fitted}")
 
 
 def _pair(option: str, text: str | None) -> list[str] | None:

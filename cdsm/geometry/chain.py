@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from cdsm.geometry.parts import STEEPEST, Disk, Joint, Link
+from cdsm.springs import SpringLaw
 
 _MOST_AXES = 400  # one behind the other; many more crash the parser of URDFs
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -54,10 +55,17 @@ class Axis(NamedTuple):
     axis: tuple[float, ...]
     limit: float  # both ways [rad]
     stops: bool  # whether the limit is where disks touch
-    stiffness: float  # k of its spring [N m/rad]; 0: none
+    stiffness: float | SpringLaw  # k of its spring [N m/rad]; 0: none; or its law
     rest_angle: float  # q_0 [rad]
     leader: str = ""  # joint whose angle it copies
     multiplier: float = 1.0  # of the angle that it copies
+
+    @property
+    def spring(self) -> tuple[float, float] | SpringLaw:
+        """Stiffness and angle of its spring, or the law."""
+        if isinstance(self.stiffness, SpringLaw):
+            return self.stiffness.at_angle(self.rest_angle or self.stiffness.angle)
+        return self.stiffness, self.rest_angle
 
 
 @dataclass

@@ -21,6 +21,7 @@ from cdsm.geometry.beams import Backbone
 from cdsm.geometry.chain import Chain, chain_of
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
 from cdsm.geometry.uniform import Hinged, Rolling, Universal, same_angle, spread_out
+from cdsm.springs import SpringLaw, law_table
 from cdsm.support import records, validation
 from cdsm.support.files import read_text, write_text
 from cdsm.support.format import plural
@@ -273,10 +274,9 @@ class Geometry(Printed):
         return tuple(f"cable{c.joint}_{next(number[c.joint])}" for c in self.cables)
 
     @property
-    def springs(self) -> dict[str, tuple[float, float]]:
-        """Stiffness [N m/rad] and angle without torque [rad] of each spring, by joint name."""
-        sprung = (axis for axis in self.chain.axes if axis.stiffness)
-        return {axis.name: (axis.stiffness, axis.rest_angle) for axis in sprung}
+    def springs(self) -> dict[str, tuple[float, float] | SpringLaw]:
+        """Stiffness [N m/rad] and angle without torque [rad], or law, of springs by joint name."""
+        return {axis.name: axis.spring for axis in self.chain.axes if axis.stiffness}
 
     def to_toml(self) -> str:
         """Return the TOML text from which :meth:`read` builds an equal geometry."""
@@ -291,6 +291,9 @@ class Geometry(Printed):
     @property
     def _table(self) -> dict[str, Any]:
         """All values that are not the usual ones, as parsed TOML."""
+        for k, joint in enumerate(self.joints, start=1):
+            if isinstance(joint.stiffness, SpringLaw):
+                law_table(joint.stiffness, f"joint {k}")  # pydantic would hide its refusal
         table: dict[str, Any] = TypeAdapter(Geometry).dump_python(self, exclude_defaults=True)
         return table
 

@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from cdsm.springs import JointSpring, SpringLaw
 from cdsm.support import records
 from cdsm.support.values import Array
 
@@ -38,7 +39,8 @@ class Joint:
             ``hole_radius`` of the :class:`Geometry`.
         disk_radius: Outer radius of the two disks [m]; None: 1.1 times the distance of the farthest
             hole from the axis.
-        stiffness: k of a spring about each axis [N m/rad]; 0: none.
+        stiffness: k of a spring about each axis [N m/rad], or its :class:`~cdsm.SpringLaw`; 0:
+            none.
         rest_angle: Angle about each axis at which the spring has no torque [rad].
         bending_stiffness: EI of a neck [N m²], instead of ``axes``.
         torsion_stiffness: GJ of the neck [N m²]; None: EI/1.3, as of a tube with Poisson's ratio
@@ -64,7 +66,7 @@ class Joint:
     limit: JointLimit | None = None
     hole_radius: records.Length | None = None
     disk_radius: records.Length | None = None
-    stiffness: records.JointSpring = 0.0
+    stiffness: JointSpring = 0.0
     rest_angle: records.Number = 0.0
     bending_stiffness: records.Bending | None = None
     torsion_stiffness: records.Torsion | None = None
@@ -84,6 +86,9 @@ class Joint:
         if self.rolls and len(self.axes) != 1:
             fault = f"axes: {len(self.axes)} given for surfaces that roll; they need one"
             raise records.CrossFaults([fault])
+        if isinstance(self.stiffness, SpringLaw) and self.stiffness.angle and self.rest_angle:
+            fault = f"rest_angle: {self.rest_angle:g} given beside a law with the angle "
+            raise records.CrossFaults([f"{fault}{self.stiffness.angle:g}; give one of them"])
         units = np.array(self.axes) / np.array(lengths)[:, None]
         if len(units) == 2 and np.linalg.norm(np.cross(*units)) < 1e-6:
             raise records.CrossFaults([f"axes: {self.axes} are parallel; one would do"])

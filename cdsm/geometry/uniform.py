@@ -12,6 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag,
 
 from cdsm.geometry.beams import Beam
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, JointLimit, Link
+from cdsm.springs import JointSpring
 from cdsm.support import records
 from cdsm.support.records import EACH, ONE, PerJoint
 
@@ -62,7 +63,8 @@ class Universal(Beam):
         cable_radius: As ``radius`` of :class:`CableRoute`, for the cables of each joint [m].
         hole_angles: φ of the cables of a joint [rad]: one list for all joints, or one for each.
         phase: Added to φ of the cables of each joint [rad].
-        joint_stiffness: Stiffness of a spring about each axis of every joint [N m/rad]; 0: none.
+        joint_stiffness: Stiffness of a spring about each axis of every joint [N m/rad], or its
+            :class:`~cdsm.SpringLaw`; 0: none.
         rest_angle: Angle about each axis at which its spring has no torque [rad].
         coupled: Whether all joints turn by the angles of the first one, as in a section that bends
             evenly.
@@ -92,7 +94,7 @@ class Universal(Beam):
     cable_radius: PerJoint[records.Length] | None = None
     hole_angles: _HoleAngles | None = None
     phase: PerJoint[records.Number] = 0.0
-    joint_stiffness: PerJoint[records.JointSpring] = 0.0
+    joint_stiffness: PerJoint[JointSpring] = 0.0
     rest_angle: PerJoint[records.Number] = 0.0
     coupled: bool = False
     spread: Turn = 0.0

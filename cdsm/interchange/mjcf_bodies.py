@@ -23,9 +23,15 @@ _STICK = 0.008  # radius of a drawn link, over the length of the arm
 
 
 def add_bodies(
-    root: etree._Element, arm: Manipulator, start: Mapping[str, float], sides: list[Side]
+    root: etree._Element,
+    arm: Manipulator,
+    start: Mapping[str, float],
+    sides: list[Side],
+    springs: Mapping[str, tuple[float, float]],
 ) -> None:
     """Add the tree of links to ``root``; ``sides`` are the side sites of all pulleys.
+
+    ``springs`` have the stiffness and the free angle of each joint.
 
     The file has the links at the joint coordinates ``start`` [rad or m], by joint name. MuJoCo
     moves a joint by qpos − ref from its place in the file. Since ref is ``start``, a new ``mjData``
@@ -34,9 +40,6 @@ def add_bodies(
     robot = parse_xml(arm.urdf, "robot")
     links = {str(link.get("name")): link for link in robot.findall("link")}
     joints = robot.findall("joint")
-    joint_springs = arm.springs
-    pairs = zip(joint_springs.stiffness.tolist(), joint_springs.angle.tolist(), strict=True)
-    springs = dict(zip(joint_springs.joints, pairs, strict=True))
     (base,) = links.keys() - {joint.find("child").get("link") for joint in joints}
     world = etree.SubElement(root, "worldbody")
     # MuJoCo reserves the name world for its root

@@ -27,6 +27,7 @@ from cdsm.plots.measured import plot_elasticity as plot_elasticity
 from cdsm.plots.measured import plot_experiment_plan as plot_experiment_plan
 from cdsm.plots.measured import plot_identification as plot_identification
 from cdsm.plots.measured import plot_monte_carlo as plot_monte_carlo
+from cdsm.plots.measured import plot_spring_fit as plot_spring_fit
 from cdsm.plots.measured import plot_tensile_fit as plot_tensile_fit
 from cdsm.plots.measured import plot_uncertainty as plot_uncertainty
 from cdsm.plots.page import draw_report as draw_report

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from cdsm.design.result import DesignSearch
     from cdsm.identification.experiment_plan import ExperimentPlan
     from cdsm.identification.result import Identification
+    from cdsm.springs.fit import SpringFit
     from cdsm.tolerancing.budget import Uncertainty
     from cdsm.tolerancing.monte_carlo import MonteCarlo
     from cdsm.wires.elasticity import Elasticity
@@ -55,6 +56,53 @@ def plot_tensile_fit(
     for ax in panels:
         ax.legend()
     question = f"wire of {MM * length:.4g} mm: how stiff is it, from which tension?"
+    style.set_heading(panels, axs, title, question)
+    return panels
+
+
+@style.styled
+def plot_spring_fit(
+    fit: SpringFit, axs: Panels | Sequence[Axes] | None = None, *, title: str | None = None
+) -> Panels:
+    """Plot torque [N m] against angle [°] with the law; the tangent [N m/rad] and what is not told.
+
+    Below the first point the tangent depends on the scale, which was given: a band is between half
+    of it and twice.
+
+    Example:
+        >>> import cdsm
+        >>> fit = cdsm.fit_spring(*cdsm.read_spring_csv("examples/data/SPRING.csv"))
+        >>> left, right = cdsm.plots.plot_spring_fit(fit)
+        >>> right.get_ylabel()
+        'tangent [N m/rad]'
+    """
+    panels = style.panels(axs, 2, height=2.6)
+    left, right = panels
+    x = fit.angle
+    ends = min(0.0, float(x[0])), max(0.0, float(x[-1]))
+    grid = np.linspace(*ends, 300)
+    left.plot(np.rad2deg(x), fit.torque, "o", color="0.5", label="points", gid="points")
+    left.plot(
+        np.rad2deg(grid), fit.law.shape.torque(grid), color=style.VERMILLION, label="law", gid="law"
+    )
+    secant = float(x @ fit.torque / (x @ x))
+    line: dict[str, Any] = {"color": style.BLUE, "linestyle": "--", "linewidth": 0.9}
+    left.plot(np.rad2deg(ends), secant * np.array(ends), label="linear", gid="linear", **line)
+    left.set(xlabel="angle from rest [°]", ylabel="torque [N m]")
+    others = [law.shape.stiffness(grid) for law in fit.others]
+    look: dict[str, Any] = {"color": style.BLUE, "alpha": 0.3, "linewidth": 0}
+    right.fill_between(np.rad2deg(grid), *others, label="scale halved, doubled", gid="band", **look)
+    tangent = fit.law.shape.stiffness(grid)
+    right.plot(np.rad2deg(grid), tangent, color=style.VERMILLION, label="law", gid="tangent")
+    for beside in (x[x < 0.0][-1:], x[x > 0.0][:1]):
+        for angle in np.rad2deg(beside).tolist():
+            right.axvline(angle, color="0.5", linestyle=":", gid="first point")
+    right.set(xlabel="angle from rest [°]", ylabel="tangent [N m/rad]")
+    style.from_zero(right, tangent, *others)
+    for ax in panels:
+        ax.legend()
+    p = f"exponent {fit.exponent:.2f} ± {fit.exponent_std:.2f}"
+    question = f"{p}; nearer to rest than the dotted line, no point tells the tangent"
     style.set_heading(panels, axs, title, question)
     return panels
 

@@ -253,10 +253,11 @@ def _require_held(arm: LockedArm, home: Posture) -> None:
     motion = vectors[:, 0]
     worst = int(abs(motion).argmax())
     name = home.arm.joint_names[worst]
-    spring = float(motion @ home.arm.springs.matrix @ motion)
+    of_springs = home.arm.springs.stiffness_at(home.q)
+    spring = float(motion @ of_springs @ motion)
     where = "springs.JOINT = 5 in ARM.toml or by --set, or joint_stiffness of the geometry, or, in "
     where += "Python, by with_springs()"
-    if home.arm.springs.matrix[worst, worst]:
+    if of_springs[worst, worst]:
         angle = place(home.q[worst], home.arm.joint_units[worst])
         unit = home.arm.stiffness_unit(worst)
         problem = (

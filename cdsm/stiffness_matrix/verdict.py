@@ -194,8 +194,8 @@ def find_slack(cables: Sequence[str]) -> Iterator[Finding]:
 
 
 def find_doubts(pose: Posture) -> Iterator[Finding]:
-    """Yield that the arm passes through itself, and that cables are about to leave a pulley."""
-    notes = pose.wrapping.remarks if pose.wrapping else ()
+    """Yield that the arm passes through itself, and what else is doubtful of the posture."""
+    notes = pose.notes
     for remark in pose.remarks:
         if remark in notes:
             yield Finding(Status.OK, remark)

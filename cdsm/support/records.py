@@ -80,7 +80,6 @@ LengthOrZero = Annotated[Number, in_range("length", zero=True)]
 FrictionCoefficient = Annotated[Number, in_range("friction", zero=True)]
 Wrap = Annotated[Number, in_range("wrap", zero=True)]
 Mass = Annotated[Number, in_range("mass", zero=True)]
-JointSpring = Annotated[Number, in_range("spring", zero=True)]
 Bending = Annotated[Number, in_range("bending stiffness")]
 Torsion = Annotated[
     float,
@@ -93,7 +92,8 @@ Vector = Annotated[tuple[Number, Number, Number], Field(strict=False), BeforeVal
 Position = Annotated[
     tuple[Coordinate, Coordinate, Coordinate], Field(strict=False), BeforeValidator(plain)
 ]
-HoleAngles = Annotated[Sequence[Number], BeforeValidator(plain), Field(min_length=1, max_length=64)]
+Numbers = Annotated[Sequence[Number], BeforeValidator(plain)]
+HoleAngles = Annotated[Numbers, Field(min_length=1, max_length=64)]
 Name = Annotated[str, AfterValidator(_name)]
 
 ONE = "(one)"

@@ -120,7 +120,7 @@ def _numbers(
         np.array([(p, d) for p, d, x in near if abs(x) <= _NEAR], np.intp).reshape(-1, 2).T
     )
     pairs = zip(chain.axes, arm.springs.stiffness.tolist(), strict=True)
-    springs = [j for j, (axis, k) in enumerate(pairs) if axis.stiffness == k > 0.0]
+    springs = [j for j, (axis, k) in enumerate(pairs) if axis.stiffness == k > 0.0]  # no laws
     n = len(chain.axes)
     bodies = np.arange(len(chain.bodies))
     at = {"shift": 3 * np.arange(n), "site": 3 * sites, "centre": 3 * bodies, "tip": [0]}
@@ -130,7 +130,8 @@ def _numbers(
         middles = [body.middle for body in chain.bodies]
         holes = [chain.disks[d].x for d in of_sites]
         masses = [body.mass for body in chain.bodies]
-        soft = [1.0 / chain.axes[j].stiffness for j in springs]
+        ks = [chain.axes[j].stiffness for j in springs]
+        soft = [1.0 / k for k in ks if isinstance(k, float)]
         return np.array([*(a.x for a in chain.axes), *holes, *middles, chain.x, *masses, *soft])
 
     return np.concatenate([starts[name] + np.array(x, np.intp) for name, x in at.items()]), read

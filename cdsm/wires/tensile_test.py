@@ -234,6 +234,8 @@ def _choices(names: list[str], header: _Header) -> str:
 def _guess(names: list[str]) -> str:
     """Return which columns to give if the header names none in English; ``names`` are its cells."""
     texts = [_name_and_unit(name)[0] for name in names]
+    if {"angle", "torque"} <= {text.lower() for text in texts}:
+        return "points of a spring? Give --spring, or, in Python, read them by read_spring_csv()."
     moved = [text for text in texts if _MOVED_ABROAD.search(text.lower())]
     force = [text for text in texts if _FORCE_ABROAD.search(text.lower())]
     if not moved or not force or moved[0] == force[0]:

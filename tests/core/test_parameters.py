@@ -30,7 +30,7 @@ def test_nothing_changed_is_the_same_arm() -> None:
 def test_an_arm_with_its_own_numbers_is_equal(name: str, where: str) -> None:
     """Also where joints have numbers of their own: equal radii are one radius of the geometry."""
     at = where if where != "@cable2_1" or "cables" in PARAMETERS[name].kinds else "@1"
-    arm = SPRUNG if name == "bending_stiffness" else ARM
+    arm = {"bending_stiffness": SPRUNG, "exponent": WITH_LAWS}.get(name, ARM)
     arm = arm.with_cables([replace(cable, series_stiffness=2e4) for cable in arm.cables])
     parameters = cdsm.ArmParameters(arm, (f"{name}{at}",))
     if len({*parameters.values(f"{name}{at}")}) == 1:
@@ -164,6 +164,12 @@ ROD = cdsm.Manipulator(
 SPRUNG = cdsm.Manipulator(
     readme_geometry(joints=2, joint_stiffness=[2.0, 1.0], bending_stiffness=5.0),
     cdsm.LinearElasticity(48e3),
+)
+
+
+LAW = cdsm.SpringLaw.power(stiffness=0.6, exponent=0.7, scale=0.03)
+WITH_LAWS = cdsm.Manipulator(
+    readme_geometry(joints=2, joint_stiffness=LAW), cdsm.LinearElasticity(48e3)
 )
 
 
