@@ -18,7 +18,7 @@ from cdsm.errors import need
 from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array, frozen
 
-_FAR = 1e3  # stands for a violation or an objective that does not exist
+_NO_VALUE = 1e3  # stands for a violation or an objective that does not exist
 
 
 def search_designs(
@@ -113,9 +113,9 @@ def _minimize(
                 np.array([[float(individual[name]) for name in named] for individual in x])
             )
             goals = designs.goals
-            missed = np.nan_to_num(designs.violations, nan=_FAR, posinf=_FAR)
+            missed = np.nan_to_num(designs.violations, nan=_NO_VALUE, posinf=_NO_VALUE)
             missed[~np.isfinite(goals).all(axis=1), 0] += 1.0
-            out["F"], out["G"] = np.where(np.isfinite(goals), goals, _FAR), missed
+            out["F"], out["G"] = np.where(np.isfinite(goals), goals, _NO_VALUE), missed
 
     constraints = 1 + len(problem.constraints)
     task = Task(vars=named, n_obj=len(problem.objectives), n_ieq_constr=constraints)

@@ -217,7 +217,7 @@ def saturation(
     *,
     fraction: float = 0.95,
 ) -> Saturation:
-    """Find the lower bound of tension above which more tension hardly stiffens an arm.
+    """Find the lower bound above which more tension adds little stiffness.
 
     With F*(b), the least tensions with the lower bound b (Eq. 17), s(b) is the stiffness along u.
     The result is the least b at which s is ``fraction`` of its largest value, interpolated between

@@ -20,7 +20,7 @@ from cdsm.wires.tensile_test import TensileTest
 
 _NORMAL: Final = 1.959963984540054  # quantile of the normal distribution for 95 %
 _EXACT: Final = 1e-4  # error of ln EA without noise: from the grid, and from the fitted table
-_ENOUGH: Final = 41  # points that tell the scatter
+_FEWEST_POINTS: Final = 41  # points that tell the scatter
 _YIELD: Final = 0.8  # EA below this share of its plateau is plastic
 _STEP: Final = 1.25  # ratio of tensions for d ln EA/d ln F; a smaller one takes noise for slope
 _LEAST: Final = 1e3  # EA [N] below which a law is doubted, as of LinearElasticity
@@ -217,9 +217,9 @@ def fit_tensile_test(
                 "needed. Sample more finely below the yield."
             )
         curve = fit_curve(strain, pull, points.noise, points.resolution)
-    if len(pull) < _ENOUGH:
+    if len(pull) < _FEWEST_POINTS:
         notes += (
-            f"{len(pull)} points, fewer than {_ENOUGH}, give the band: it may miss EA more often",
+            f"{len(pull)} points, fewer than {_FEWEST_POINTS}, give the band: it may miss EA more often",
         )
     if curve.correlation > 4.0 / np.sqrt(len(pull)):
         notes += (
