@@ -1,15 +1,14 @@
 """Forward statics with friction in the holes: the rest depends on the path, which is followed."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import cdsm
 from cdsm.support.values import Array
+from tests.validation import rod as measured
 
-DATA = Path(__file__).parents[1] / "data" / "rod_one_tendon.csv"
 THREE = (0.0, 2.094, 4.189)
 FORCES = np.array([4.0, 1.0, 2.5])
 LOAD = np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0])
@@ -43,24 +42,9 @@ def rod(
     return cdsm.Manipulator(geometry, cables=cables, gravity=gravity)
 
 
-def measured() -> tuple[Array, Array]:
-    """Tensions (8,) [N] and shapes (8, 11, 2) [mm]: along the straight rod, and across."""
-    table = np.loadtxt(DATA, delimiter=",", skiprows=3)
-    points = table[:, 2:].reshape(9, 11, 3)
-    points = points - points[:, :1]
-    along = points[0, -1] / np.linalg.norm(points[0, -1])
-    across = points[[4, 6, 8], -1].sum(axis=0)
-    across -= (across @ along) * along
-    axes = np.array([along, across / np.linalg.norm(across)])
-    return table[11::11, 0], (points @ axes.T)[1:]
-
-
 def shape(pose: cdsm.Posture) -> Array:
     """Centres of the disks (11, 2) [mm] from the first one: along x, and across."""
-    disks = pose.arm.geometry.disks
-    centres = [(pose.link_pose(disk.link) @ [disk.x, 0.0, 0.0, 1.0])[:3] for disk in disks]
-    moved = 1e3 * (np.array(centres) - centres[0])
-    return np.column_stack([moved[:, 0], np.linalg.norm(moved[:, 1:], axis=1)])
+    return measured.in_plane(measured.disk_centres(pose))
 
 
 def distance(one: Array, other: Array) -> float:
@@ -79,10 +63,10 @@ def distance(one: Array, other: Array) -> float:
     ],
 )
 def test_shapes_of_a_measured_rod(E: float, mu: float, rms: float) -> None:
-    tensions, shapes = measured()
     arm = rod(mu, E)
-    computed = [shape(cdsm.forward_statics(arm, tension=[F]).pose) for F in tensions]
-    off = np.sqrt(np.mean(np.sum((np.array(computed) - shapes) ** 2, axis=2)))
+    computed = [shape(cdsm.forward_statics(arm, tension=[F]).pose) for F in measured.TENSIONS[1:]]
+    off = np.array(computed) - measured.shapes_in_plane()[1:]
+    off = np.sqrt(np.mean(np.sum(off**2, axis=2)))
     assert off == pytest.approx(rms, abs=0.02)
 
 
