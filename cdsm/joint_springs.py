@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
 
 from cdsm.errors import InvalidInput, listed
 from cdsm.joints import Coupling
@@ -161,6 +160,8 @@ class Springs:
         Each joint follows one other. So the torque for q_j rises, and has its zero between the
         angles at which the springs are free one by one.
         """
+        from scipy.optimize import brentq  # slow to import
+
         assert self._coupling is not None
         factor = self._coupling.matrix[:, j]
         behind = np.flatnonzero(factor * self.stiffness)

@@ -30,7 +30,7 @@ _CIRCLE: Final = np.array([np.cos(TURN), np.sin(TURN)])
 
 _MANY_DISKS = 16  # of more, the plates are fainter
 _MANY_BONES = 30  # of more, the tube is thinner
-_LARGEST_MOVE = 0.3  # a tip that moved farther, over the arm's length, is drawn without its reference
+_LARGEST_MOVE = 0.3  # of a tip over the arm's length; beyond, its reference is not drawn
 _MOVED = 0.2  # largest half axis of a drawn compliance, over the arm's length
 _ARROW = 0.22  # length of a drawn force, over the arm's length
 _NOTES = 3  # most lines of a warning below the picture

@@ -219,7 +219,7 @@ def fit_tensile_test(
         curve = fit_curve(strain, pull, points.noise, points.resolution)
     if len(pull) < _FEWEST_POINTS:
         notes += (
-            f"{len(pull)} points, fewer than {_FEWEST_POINTS}, give the band: it may miss EA more often",
+            f"{len(pull)} points, fewer than {_FEWEST_POINTS}: the band may miss EA more often",
         )
     if curve.correlation > 4.0 / np.sqrt(len(pull)):
         notes += (
