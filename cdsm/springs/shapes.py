@@ -8,8 +8,6 @@ from functools import cached_property
 from typing import Any, Protocol, Self
 
 import numpy as np
-from scipy.integrate import quad
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from cdsm.errors import InvalidInput
 from cdsm.support.values import Array
@@ -120,6 +118,8 @@ class Table:
     @cached_property
     def _parts(self) -> tuple[Any, Any, Any, Array, Array]:
         """Torque, its derivative and its integral as polynomials; the ends and the slopes there."""
+        from scipy.interpolate import CubicHermiteSpline, PchipInterpolator  # slow to import
+
         x = np.array(self.angles)
         y = np.array(self.torques)
         if 0.0 not in self.angles:
@@ -214,6 +214,8 @@ class Given:
         if self.integral is not None:
             both = _values("energy", self.integral, np.stack([x, np.zeros_like(x)]))
             return np.asarray(self.factor * (both[0] - both[1]))
+
+        from scipy.integrate import quad  # slow to import
 
         def torque(x: float) -> float:
             return float(self.torque(np.array(x)))
