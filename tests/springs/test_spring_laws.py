@@ -4,6 +4,7 @@ import copy
 import dataclasses
 import pickle
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -412,3 +413,60 @@ def test_an_arm_that_its_laws_do_not_hold_is_told_the_tangent_at_rest() -> None:
         cdsm.forward_statics(
             hinges(weak, joints=1, link_mass=1.0).with_gravity("-x"), tension=np.zeros(2)
         )
+
+
+WRENCHES: tuple[Any, ...] = ([0, 0, -0.3, 0, 0, 0], {"link2": [0, 0, -0.4, 0, 0, 0]})
+
+
+@pytest.mark.parametrize("wrench", WRENCHES)
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+@pytest.mark.parametrize("coupled", [False, True])
+def test_laws_with_friction_loads_on_links_and_followers(
+    coupled: bool, friction: float, wrench: Any
+) -> None:
+    """Each answers, or is refused by name."""
+    sizes = {**SIZES, "joints": 3, "cables_per_joint": 3, "link_mass": 0.05, "lead": 0.05}
+    geometry = readme_geometry(**sizes, joint_stiffness=POWER, coupled=coupled)
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(1e4)).with_friction(friction)
+    F = np.full(len(arm.cables), 3.0)
+    F[0] = 5.0
+    rest = cdsm.forward_statics(arm, tension=F, wrench=wrench)
+    assert rest.verdict.is_firm
+    assert rest.verdict.status is not cdsm.Status.UNBALANCED
+    # the laws are in its K_θ: three joints follow each angle
+    alike = 3.0 if coupled else 1.0
+    expected = alike * np.diag(POWER.stiffness(rest.pose.q))
+    np.testing.assert_allclose(rest.stiffness.springs, expected, rtol=1e-12)
+    bare = arm.with_springs({}).at(rest.pose.q, check_limits=False)
+    here = cdsm.stiffness(rest.pose, F, wrench)
+    torque = here.residual - cdsm.stiffness(bare, F, wrench).residual
+    np.testing.assert_allclose(torque, alike * POWER.torque(rest.pose.q), atol=1e-13)
+    if not isinstance(wrench, dict):
+        rows = cdsm.evaluate(arm, rest.pose.q[None], F, wrench, ("joint",), check_limits=False)
+        near = 1e-11 * abs(here.joint).max()
+        np.testing.assert_allclose(rows["joint"][0], here.joint, rtol=0.0, atol=near)
+    with pytest.raises(cdsm.InvalidInput, match="history") if friction else nullcontext():
+        again = cdsm.forward_statics(arm, tension=F, wrench=wrench, start=rest.pose.q)
+        np.testing.assert_allclose(again.pose.q, rest.pose.q, atol=1e-9)
+
+
+def test_designs_and_plans_take_laws() -> None:
+    arm = hinges(POWER, joints=3)
+    pose = arm.at(Q[:3])
+    problem = cdsm.DesignProblem(
+        arm=arm,
+        variables=[cdsm.Variable("exponent", 0.5, 1.5), cdsm.Variable("joint_stiffness", 0.2, 2.0)],
+        objectives=[cdsm.Objective("along", direction="z")],
+        postures=[pose.q],
+    )
+    law = cdsm.SpringLaw.power(stiffness=0.9, exponent=1.2, scale=np.deg2rad(2.0))
+    made = problem.arm_of([1.2, 0.9]).springs.given["joint2"]
+    assert isinstance(made, cdsm.SpringLaw)
+    np.testing.assert_allclose(made.torque(X), law.torque(X), rtol=1e-12)
+    assert problem.start == pytest.approx([0.74, 0.56])
+    span = cdsm.stiffness_range(pose, "z", 2.0, 60.0)
+    target = (span.low + span.high) / 2.0
+    plan = cdsm.plan_stiffness(pose, "z", target, 2.0, 60.0)
+    K = cdsm.stiffness(pose, plan.tension)
+    assert K.along("z") == pytest.approx(target, rel=1e-6)
+    assert abs(K.residual).max() < 1e-10
