@@ -62,6 +62,7 @@ from cdsm.measures.indices import isotropy as isotropy
 from cdsm.measures.indices import tension_factor as tension_factor
 from cdsm.measures.payload import payload as payload
 from cdsm.measures.polytope import force_polytope as force_polytope
+from cdsm.motors import Motor as Motor
 from cdsm.planning.path import plan_path as plan_path
 from cdsm.planning.plan import plan_stiffness as plan_stiffness
 from cdsm.planning.range import stiffness_range as stiffness_range

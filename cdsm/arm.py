@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.cable import Cables
 from cdsm.cable_laws import CableLaws
 from cdsm.definition import ArmDefinition
-from cdsm.errors import InvalidInput, warn
+from cdsm.errors import InvalidInput, listed, warn
 from cdsm.geometry import Geometry
 from cdsm.joint_springs import SpringOfJoint, Springs, springs_of
 from cdsm.limits import beyond_limits, require_within_limits
+from cdsm.motors import Motors
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import SHORTEST_SEGMENT, Routing
 from cdsm.segments import Chains
@@ -45,6 +46,7 @@ class ComputedArm(Printed):
         wraps: Cables over pulleys; None: there are none.
         routing: Sites and segments of the cables; contacts with all pulleys, if there are any.
         laws: Elasticities of the cables.
+        motors: What moves the cables: ``arm.motors.matrix`` is B (C, M).
     """
 
     definition: ArmDefinition
@@ -53,6 +55,7 @@ class ComputedArm(Printed):
     wraps: Wraps | None = field(compare=False)
     routing: Routing = field(compare=False)
     laws: CableLaws = field(compare=False)
+    motors: Motors = field(compare=False)
 
     @classmethod
     def of(cls, definition: ArmDefinition, like: Self | None = None) -> Self:
@@ -78,7 +81,7 @@ class ComputedArm(Printed):
         laws = CableLaws(cables)
         # once; from here on the arm is frozen
         vars(self).update(definition=named, body=body, springs=springs, routing=routing, laws=laws)
-        vars(self).update(wraps=wraps)
+        vars(self).update(wraps=wraps, motors=Motors(named.motors, cables))
         for doubt in self._doubts:
             if like is None or doubt not in like._doubts:
                 warn(f"{self.name}: {doubt}")
@@ -95,6 +98,25 @@ class ComputedArm(Printed):
     def replace(self, **changes: Any) -> Self:
         """Return an arm with other values of its :class:`ArmDefinition`."""
         return self.of(replace(self.definition, **changes), self)
+
+    def with_forced(self, forced: NDArray[np.bool_]) -> Self:
+        """Return the arm of which the motors of cables ``forced`` (C,) hold the tensions.
+
+        These cables have no stiffness, so what else their motors move does not count any more.
+        InvalidInput if a motor that yields moves such a cable beside another one.
+        """
+        pairs = zip(self.cables, forced, strict=True)
+        cables = [replace(cable, control="force") if hold else cable for cable, hold in pairs]
+        names = {cable.name for cable, hold in zip(self.cables, forced, strict=True) if hold}
+        kept = [motor for motor in self.definition.motors if motor.yields]
+        for motor in kept:
+            both = names & motor.cables.keys()
+            if both and both != motor.cables.keys():
+                problem = f"yields, and moves {listed(sorted(both))}, which has no stiffness here, "
+                problem += "beside others; this is not known of motors that yield."
+                raise InvalidInput(f"motor {motor.name!r}", problem)
+        motors = [motor for motor in kept if not names & motor.cables.keys()]
+        return self.replace(cables=cables, motors=motors)
 
     @property
     def name(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,10 @@ from cdsm.cable import Cable
 from cdsm.errors import ElasticityRangeError
 from cdsm.support.values import Array, frozen
 from cdsm.wires.elasticity import Elasticity, newton_in_bracket
+
+Selection = slice | NDArray[np.intp]
+
+_HUGE = 1e12  # no tension [N] is beyond
 
 
 def group_by_law(cables: Iterable[tuple[int, Cable]]) -> dict[Elasticity, list[int]]:
@@ -168,9 +173,7 @@ class CableLaws:
             slope[group] = stiffness[group] * (share + (1.0 - share) * rise) / (EA * stretch)
         return frozen(slope)
 
-    def _evaluate(
-        self, law: Elasticity, group: slice | NDArray[np.intp], tension: Array
-    ) -> tuple[Array, Array]:
+    def _evaluate(self, law: Elasticity, group: Selection, tension: Array) -> tuple[Array, Array]:
         """Compute 1 + ε and EA [N] of the cables ``group``."""
         try:
             strain, EA = law.evaluate(law.require_inside(tension))
@@ -178,13 +181,42 @@ class CableLaws:
             raise self.naming(error, group) from None
         return 1.0 + strain, EA
 
-    def naming(
-        self, error: ElasticityRangeError, group: slice | NDArray[np.intp]
-    ) -> ElasticityRangeError:
+    def naming(self, error: ElasticityRangeError, group: Selection) -> ElasticityRangeError:
         """Return a copy of a law's error at the cables ``group`` that also names the cables."""
         outside = np.arange(len(self._cables))[group][list(error.indices)].tolist()
         names = [self._cables[c].name for c in outside]
         return ElasticityRangeError(error.problem, error.tension, outside, names)
+
+
+class LockedLaw(NamedTuple):
+    """The n position-controlled cables with one law, in their order; arrays are (n,)."""
+
+    law: Elasticity
+    cables: Selection
+    rest_length: Array  # [m]
+    series: Array  # compliance of the springs [m/N]
+    start: Array  # a tension F_0 [N]
+    strain: Array  # of the wire at F_0
+    length: Array  # of the cable at F_0 [m]
+
+    def elongation(self, F: Array) -> tuple[Array, Array]:
+        """Compute the elongation from F_0 to F [m], and its slope [m/N]."""
+        inside = np.minimum(np.maximum(F, self.law.low), self.law.high)
+        strain, EA = self.law.evaluate(inside)
+        slope = self.rest_length / EA + self.series
+        wire = self.rest_length * (strain - self.strain)
+        return wire + (inside - self.start) * self.series + (F - inside) * slope, slope
+
+    def continued_tension(self, lengths: Array) -> tuple[Array, Array]:
+        """Compute F [N], also below 0 N, and dL/dF [m/N] at lengths L [m]."""
+        wanted = lengths - self.length
+        ends = np.full((2, lengths.size), [[-_HUGE], [_HUGE]])
+
+        def error(F: Array) -> tuple[Array, Array]:
+            reached, slope = self.elongation(F)
+            return reached - wanted, slope
+
+        return newton_in_bracket(error, self.start, *ends)
 
 
 def _stretch(

@@ -13,6 +13,7 @@ from cdsm.cable_path import positions
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry import Geometry
 from cdsm.joint_springs import Spring
+from cdsm.motors import Motor, checked_motors
 from cdsm.rigid_body import GRAVITY, RigidBody
 from cdsm.support.validation import (
     LONGEST,
@@ -95,10 +96,12 @@ class ArmDefinition:
         springs: Springs by the name of their joint, as for :meth:`Manipulator.with_springs`; None:
             those of the geometry.
         terms: Further terms of the energy, as for :meth:`Manipulator.with_terms`.
+        motors: Motors that move several cables, or yield, as for :meth:`Manipulator.with_motors`;
+            a cable that none of them moves has a motor of its own.
 
     Raises:
         InvalidInput: Gravity is not three numbers, or joint names are no texts. There are no
-            cables, two have the same name, or a term is none.
+            cables, two have the same name, or a term is none. A motor does not fit the cables.
     """
 
     urdf: str
@@ -110,16 +113,19 @@ class ArmDefinition:
     tolerances: Tolerances = Tolerances()  # noqa: RUF009  # frozen
     springs: Mapping[str, Spring] | None = None
     terms: tuple[Term, ...] = ()
+    motors: tuple[Motor, ...] = ()
 
     def __post_init__(self) -> None:  # fields may be given as other sequences, or an axis
         gravity = gravity_vector("gravity", self.gravity)
         names = self.joint_names
+        cables = _checked_cables(self.cables)
         checked = {
-            "cables": _checked_cables(self.cables),
+            "cables": cables,
             "gravity": tuple(gravity.tolist()),
             "joint_names": None if names is None else sequence_of("joint_names", names, str),
             "tolerances": instance("tolerances", self.tolerances, Tolerances),
             "terms": checked_terms(self.terms),
+            "motors": checked_motors(self.motors, cables) if self.motors else (),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)

@@ -22,6 +22,7 @@ from cdsm.definition import ArmDefinition, Term
 from cdsm.errors import InvalidInput
 from cdsm.geometry import Geometry
 from cdsm.joint_springs import Spring
+from cdsm.motors import Motor
 from cdsm.posture import Posture
 from cdsm.rigid_body import GRAVITY
 from cdsm.support.files import write_text
@@ -61,15 +62,18 @@ class Manipulator(ComputedArm):
             is not given. Their sites may be on any links of :attr:`urdf`.
         gravity: Gravity in base axes (3,) [m/s²], or an axis such as ``"-y"`` for 9.81 m/s² along
             it; (0, 0, 0) for none.
+        motors: Motors that move several cables, or yield: see :meth:`with_motors`.
 
     Attributes:
         springs: Springs at the joints: ``springs.stiffness`` k (n,) [N m/rad] and
             ``springs.angle`` q_0 (n,) [rad], at which they have no torque; of all n joints, also
             those that follow others. Of a spring with a law, k is the tangent at q_0.
+        motors: All motors: ``motors.matrix`` is B (C, M) [m/rad], ``motors.names`` are their names.
 
     Raises:
         InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, or gravity is
-            not three numbers. Two cables have the same name, or a cable is on an unknown link.
+            not three numbers. Two cables have the same name, or a cable is on an unknown link. A
+            motor does not fit the cables.
         FileError: The file of the cables cannot be read.
 
     Example:
@@ -87,6 +91,7 @@ class Manipulator(ComputedArm):
         *,
         cables: CablesOrFile | None = None,
         gravity: Direction = GRAVITY,
+        motors: Sequence[Motor] = (),
     ) -> None:
         if isinstance(geometry, str | os.PathLike):
             problem = f"{str(geometry)!r} given; a Geometry is needed. "
@@ -100,6 +105,7 @@ class Manipulator(ComputedArm):
         routed = _read(cables) if elasticity is None else serpentine_cables(described, elasticity)
         urdf = to_urdf(described)
         defined: Any = {"cables": routed, "gravity": gravity, "geometry": described}
+        defined["motors"] = motors
         self.compute(ArmDefinition(urdf=urdf, tip_link=TIP, **defined))
 
     @classmethod
@@ -113,6 +119,7 @@ class Manipulator(ComputedArm):
         gravity: Direction = GRAVITY,
         check_inertia: bool = True,
         springs: Mapping[str, Spring] | None = None,
+        motors: Sequence[Motor] = (),
     ) -> Manipulator:
         """Build an arm from a URDF and cables: a tree of revolute, prismatic and fixed joints.
 
@@ -131,6 +138,7 @@ class Manipulator(ComputedArm):
             check_inertia: Refuse moments of inertia that no rigid body can have. Stiffness does not
                 depend on them, but :func:`~cdsm.modes` do.
             springs: As for :meth:`with_springs`; a URDF has no element for them.
+            motors: As for :meth:`with_motors`.
 
         Raises:
             FileError: The file of the URDF or of the cables cannot be read.
@@ -147,7 +155,8 @@ class Manipulator(ComputedArm):
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
         defined: Any = {"cables": _read(cables), "joint_names": joint_names, "gravity": gravity}
-        return cls.of(ArmDefinition(urdf=text, tip_link=tip, springs=springs, **defined))
+        defined |= {"springs": springs, "motors": motors}
+        return cls.of(ArmDefinition(urdf=text, tip_link=tip, **defined))
 
     @classmethod
     def read(
@@ -324,6 +333,31 @@ class Manipulator(ComputedArm):
             True
         """
         return self.replace(terms=terms)
+
+    def with_motors(self, motors: Sequence[Motor]) -> Manipulator:
+        """Return the same arm whose cables are moved by these motors.
+
+        A cable that none of them names has a rigid motor of its own. Rigid motors leave K_θ as it
+        is, whatever they move together: only which tensions they can reach differs. Motors that
+        yield soften it: with B (C, M) [m/rad] = ``arm.motors.matrix`` and K_L = diag k, its passive
+        term is J_Lᵀ K_eff J_L, K_eff = K_L − K_L B (k_m + Bᵀ K_L B)⁻¹ Bᵀ K_L.
+
+        Args:
+            motors: Motors with the radii of the drums by cable; none: one for each cable.
+
+        Raises:
+            InvalidInput: A motor moves no cable, an unknown one, or one that controls force; its
+                name is in use; or turns of some motors undo each other in all cables.
+
+        Example:
+            >>> import cdsm
+            >>> pair = cdsm.Motor("m1", {"cable1_1": 0.012, "cable1_2": -0.012}, stiffness=20.0)
+            >>> arm = cdsm.presets.virtual_prototype()
+            >>> poses = [a.at([0.1] * 10) for a in (arm, arm.with_motors([pair]))]
+            >>> [round(cdsm.stiffness(pose, [60.0] * 15).margin, 1) for pose in poses]
+            [61.3, 38.6]
+        """
+        return self.replace(motors=motors)
 
     def with_gravity(self, gravity: Direction) -> Manipulator:
         """Return the same arm under another gravity: (3,) [m/s²] in base axes, or an axis.

@@ -6,7 +6,7 @@ The torques add up to zero in balance (Eq. 13), the stiffnesses to K_θ (Eq. 16)
           active   passive        gravity   load
 
 The cables are two potentials: :class:`ConstantPull` is what they would give if their motors held
-the tensions, :class:`Stretch` what their elasticity adds if the motors are locked.
+the tensions, :class:`Stretch` what their elasticity adds if the motors are locked, or yield.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ import numpy as np
 
 from cdsm.definition import Term
 from cdsm.joint_springs import Springs
+from cdsm.locked_wires import LockedWires
+from cdsm.motors import Yielding
 from cdsm.posture import Posture
 from cdsm.support.values import Array, total
 
@@ -105,6 +107,7 @@ class Stretch:
     cable_stiffness: Array  # dF/dL (C,) [N/m] at F_0
     free_length: Array | None = None  # l_0 (C,) [m]
     length: Array | None = None  # L (C,) [m] at F_0
+    motors: Yielding | None = None  # those that yield, with K_eff in the place of diag k
     _last: tuple[Posture, tuple[Array, Array]] | None = None  # energy, then torque are asked for
     name: ClassVar[str] = "passive"
 
@@ -121,20 +124,39 @@ class Stretch:
         return self.tension @ abs(pose.length_jacobian)
 
     def stiffness(self, pose: Posture) -> Array:
-        """Compute J_Lᵀ K_L J_L (nv, nv) [N m/rad]."""
-        J = pose.length_jacobian
-        return (J.T * self.cable_stiffness) @ J
+        """Compute J_Lᵀ K_L J_L (nv, nv) [N m/rad], of motors that yield J_Lᵀ K_eff J_L."""
+        return passive_stiffness(pose.length_jacobian, self.cable_stiffness, self.motors)
 
     def _follow(self, pose: Posture) -> tuple[Array, Array]:
-        """Compute the tensions F (C,) [N] and the energies (C,) [J] of the cables at a posture."""
+        """Compute the tensions F (C,) [N] and the energies (n,) [J] of the cables at a posture.
+
+        With motors that yield by φ, U = Σ ∫F dL + ½ φᵀ k_m φ − τ_0·φ − F_0·(L − L_0), in which the
+        cables are longer by B φ and τ_0 = Bᵀ F_0: it is the least over φ.
+        """
         assert self.free_length is not None
         assert self.length is not None
         if self._last is None or self._last[0] is not pose:
             taut = self.tension + self.cable_stiffness > 0.0
             longer = np.where(taut, pose.cable_lengths - self.length, 0.0)
-            F, energy = pose.arm.laws.stretched(self.tension, self.free_length, longer)
-            self._last = pose, (F, energy - self.tension * longer)
+            pulled = longer
+            of_motors: tuple[float, ...] = ()
+            if self.motors is not None:
+                laws = pose.arm.laws
+                wires = self.tension, self.length, self.free_length, self.motors
+                turn = LockedWires.of(laws, *wires).at(self.length + longer, taut).turn
+                more = self.motors.matrix @ turn
+                pulled = np.where(taut, longer + more, 0.0)
+                work = self.motors.stiffness @ turn**2 / 2.0 - self.tension @ more
+                of_motors = (float(work),)
+            F, energy = pose.arm.laws.stretched(self.tension, self.free_length, pulled)
+            self._last = pose, (F, np.append(energy - self.tension * longer, of_motors))
         return self._last[1]
+
+
+def passive_stiffness(J: Array, cable_stiffness: Array, motors: Yielding | None) -> Array:
+    """Compute J_Lᵀ K_eff J_L (nv, nv) [N m/rad]; K_eff is diag k without motors that yield."""
+    rigid: Array = (J.T * cable_stiffness) @ J
+    return rigid if motors is None else rigid - motors.softening(J, cable_stiffness)
 
 
 def torque_of(terms: Iterable[Term], pose: Posture) -> Array:

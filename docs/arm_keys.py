@@ -25,6 +25,7 @@ def table() -> str:
     pulley = attributes_of(cdsm.Pulley)
     at_joint = attributes_of(cdsm.JointPulley)
     sheath = attributes_of(cdsm.Sheath)
+    motor = attributes_of(cdsm.Motor)
     rows = [
         *_rows("top", attributes_of(ArmFile)),
         *_rows("top, `[cables.NAME]`, `[[cables]]`", {key: cable[key] for key in SETTINGS}),
@@ -35,6 +36,7 @@ def table() -> str:
         *_rows("`sites`, a pulley", {key: pulley[key] for key in ("turns", "bearing")}),
         *_rows("`sites`, a pulley at a joint", {key: at_joint[key] for key in ("joint", "turn")}),
         *_rows("`sites`, a sheath", {"sheath": sheath["length"], "pieces": sheath["pieces"]}),
+        *_rows("`[motors.NAME]`", {key: motor[key] for key in ("cables", "stiffness", "control")}),
         *_rows("`[urdf]`", attributes_of(Urdf)),
         *_rows("`[universal]`, `[hinged]`", attributes_of(cdsm.Geometry.universal)),
         *_rows("`[hinged]`", {"twist": "Angle about x from each hinge axis to the next [rad]."}),

@@ -21,6 +21,7 @@ from cdsm.cable_path import Site
 from cdsm.definition import ArmDefinition, refuse_terms
 from cdsm.errors import FileError, GeometryError, InvalidInput
 from cdsm.joint_springs import Spring
+from cdsm.motors import Motor
 from cdsm.springs import SpringLaw, law_table
 from cdsm.support.described import attributes_of, in_plain_text
 from cdsm.support.files import write_text
@@ -162,9 +163,23 @@ def _spring_tables(springs: Mapping[str, Spring] | None) -> dict[str, Any] | Non
     }
 
 
+def _motor_tables(motors: Sequence[Motor]) -> dict[str, Any]:
+    """Return the tables [motors.NAME]; what has its usual value is left out."""
+    tables: dict[str, Any] = {}
+    for motor in motors:
+        rigid = math.isinf(motor.stiffness)
+        tables[motor.name] = {
+            "cables": dict(motor.cables),
+            "stiffness": None if rigid else motor.stiffness,
+            "control": None if motor.control == "position" else motor.control,
+        }
+    return tables
+
+
 _TABLES: Final[dict[str, Callable[[Any], Any]]] = {
     "springs": _spring_tables,
     "tolerances": tolerance_table,
+    "motors": _motor_tables,
 }
 
 

@@ -238,13 +238,17 @@ class Chunk:
             terms[:, 0] += self._rows.shifts(self._one_by_one(F), self._part)[rows]
         J_v = self._tip_jacobian(at)[rows, :3]
         torque = self._rows.directions @ J_v
+        moves = readings.moves_tip(torque, J_v)
+        K = terms.sum(axis=1)
+        magnitudes = abs(terms).sum(axis=1)
+        J = self._one_by_one(at.jacobian)[rows]
+        soft = self._rows.arm.motors.yielding
+        if soft is not None:
+            K, magnitudes, J = soft.extended(K, magnitudes, J, cable_stiffness[rows])
+            no_torque = np.zeros((*torque.shape[:-1], len(soft.names)))
+            torque = np.concatenate([torque, no_torque], axis=-1)
         along, _, buckles = readings.one_sided_along(
-            terms.sum(axis=1),
-            abs(terms).sum(axis=1),
-            self._one_by_one(at.jacobian)[rows],
-            np.where(slack, cable_stiffness, 0.0)[rows],
-            torque,
-            readings.moves_tip(torque, J_v),
+            K, magnitudes, J, np.where(slack, cable_stiffness, 0.0)[rows], torque, moves
         )
         values["along"][rows] = along
         self.status[rows[buckles]] = Status.UNSTABLE
@@ -256,6 +260,7 @@ class Chunk:
             and self._table.coupling is None
             and self._rows.shifts is None
             and self._names.isdisjoint(TERMS_OF_K)
+            and self._rows.arm.motors.yielding is None
             and wanted <= {"along"}
         )
 
@@ -297,7 +302,13 @@ class Chunk:
                 body = body._replace(spring=frozen(some(body.spring)))
         count = 5 if self._rows.arm.has_springs or "springs" in self._names else 4
         terms = one_by_one(self._stiffness(at, body, F, k, W, count)[0], number)
-        return coupling.square(terms) if coupling else terms
+        terms = coupling.square(terms) if coupling else terms
+        soft = self._rows.arm.motors.yielding
+        if soft is not None:  # of rank m, beside the kernel
+            J = one_by_one(at.jacobian, number)
+            J = J @ coupling.matrix if coupling else J
+            terms[:, TERMS_OF_K.index("passive")] -= soft.softening(J, one_by_one(k, number))
+        return terms
 
     def _stiffness(
         self, at: PoseArrays, body: BodyArrays, F: Array, k: Array, W: Array, count: int

@@ -24,6 +24,7 @@ from cdsm.batch.chunk import Chunk, Scratch
 from cdsm.batch.quantities import Codes, shapes_of
 from cdsm.batch.rows import ArmTables, Rows, tables_of
 from cdsm.batch.wrapped_rows import solve_wrapped
+from cdsm.motors import refuse_shared
 from cdsm.quantities import QUANTITIES
 
 # numbers of the poses of a chunk, compiled and by numpy, where a chunk has one block; 64 postures
@@ -155,6 +156,9 @@ def _source() -> Path:
 
 def solve_rows(rows: Rows, threads: int = 1) -> tuple[dict[str, NDArray[Any]], Codes]:
     """Compute the quantities of all rows by name (N, …), and the status (N,) of each row."""
+    if rows.bounds is not None:
+        remedy = "Give tension=, or use distribute_tension(pose, assembly=) posture by posture."
+        refuse_shared(rows.arm.motors, "minimum", remedy)
     if rows.arm.wraps is not None and rows.touches is None:
         return solve_wrapped(rows, threads, solve_rows)
     table = tables_of(rows.arm, rows.touches)

@@ -218,6 +218,7 @@ def weigh(
     """
     if out is not None and cycles is None:
         raise misuse("--out", "is the table of --cycles; give both.")
+    from cdsm.measures.holding import holding_locked
     from cdsm.support.format import coordinates, without_rounding
 
     robot = options.load_arm(arm, changes)
@@ -242,8 +243,9 @@ def weigh(
     else:
         more = {}
         result = cdsm.weight_test(pose, start, weight[:3], steps=steps or 5)
-        if rest is None:
-            held = cdsm.payload(pose, weight[:3], minimum, maximum, tension=K.tension).locked
+        if (bounds := K.distribution) is not None:
+            u = weight[:3] / math.hypot(*weight[:3])
+            held = holding_locked(pose, u, weight * 0.0, K.tension, bounds.maximum_held)
             more = {"holds": held}
         without = " without friction" if pose.arm.has_friction else ""
         note = f"at the full load{without}:\n{result.states[-1]}\n\n{held or ''}".rstrip()

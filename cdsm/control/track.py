@@ -33,6 +33,7 @@ from cdsm.control.sensing import Observer, Sensors
 from cdsm.errors import CdsmError, InvalidInput, listed
 from cdsm.friction.stick import half_width
 from cdsm.manipulator import Manipulator
+from cdsm.motors import YIELDING_REMEDY, refuse_shared, refuse_yielding
 from cdsm.planning.path import checked_change
 from cdsm.planning.path_plan import PathPlan
 from cdsm.posture import Posture
@@ -116,6 +117,7 @@ def track(
         inside the first-order band                                  no step has one
     """
     arm = instance("plan", plan, PathPlan).arm
+    refuse_shared(arm.motors, "plan")
     if not plan.complete:
         first = plan.infeasible[0]
         lacking = f"{len(plan.infeasible)} of {len(plan.target)}"
@@ -129,6 +131,9 @@ def track(
     if isinstance(plant, type) or not hasattr(plant, "step_to"):  # an arm by itself, for example
         problem = f"{plant!r} given; a plant is needed, such as QuasiStaticPlant(arm)."
         raise InvalidInput("plant", problem)
+    refuse_shared(plant.arm.motors, "plant")
+    why = "yields, and controllers know rigid motors only"
+    refuse_yielding(plant.arm.motors, "plant", why, YIELDING_REMEDY)
     planned_names = (*arm.joint_names, *arm.cables.names)
     plant_names = (*plant.arm.joint_names, *plant.arm.cables.names)
     if planned_names != plant_names:

@@ -17,7 +17,7 @@ from cdsm.cable import require_own_cables
 from cdsm.definition import refuse_terms
 from cdsm.design.goals import Constraint, Measure, Objective
 from cdsm.design.variables import WHOLE, Value, Variable, changed
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, listed
 from cdsm.manipulator import Manipulator
 from cdsm.parameters import PARAMETERS
 from cdsm.support.format import plural
@@ -83,6 +83,10 @@ class DesignProblem(ReadOnlyState):
         geometry = instance("arm", self.arm, Manipulator).geometry  # raises without one
         refuse_terms(self.arm.definition.terms, "batches, and so designs, have no kernel for")
         require_own_cables(geometry, self.arm.cables)
+        if given := [motor.name for motor in self.arm.definition.motors]:
+            problem = f"designs know one rigid motor for each cable, not {listed(given)}; take "
+            problem += "[motors] out of the ARM.toml, or use arm.with_motors([])."
+            raise InvalidInput("arm", problem)
         variables = sequence_of("variables", self.variables, Variable)
         objectives = sequence_of("objectives", self.objectives, Objective)
         constraints = sequence_of("constraints", self.constraints, Constraint)

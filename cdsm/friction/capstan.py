@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from cdsm.applied import Applied
 from cdsm.cable import Cable
 from cdsm.cable_laws import group_by_law
+from cdsm.motors import refuse_rough
 from cdsm.posture import Posture
 from cdsm.routing import Indices
 from cdsm.stiffness_matrix import FrictionState, Stiffness, assemble
@@ -204,6 +205,11 @@ def assemble_segments(
     ``sliding`` (P,) marks the holes in which cables slide. Raises ElasticityRangeError if a tension
     is outside the domain of its law.
     """
+    refuse_rough(pose.arm.motors, pose.arm.has_friction, "friction")
+    if pose.arm.motors.yielding is not None:  # without friction
+        F = frozen(tension[pose.segments.chains.start[:-1]])
+        k = pose.arm.laws.stiffness(pose.cable_lengths, F)
+        return assemble(pose, F, wrench, k, distribution)
     segments = pose.segments
     laws = pose.segments.chains.laws
     chains = segments.chains

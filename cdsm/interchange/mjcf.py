@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -29,6 +28,7 @@ from cdsm.errors import InvalidInput, listed, warn
 from cdsm.interchange.mjcf_bodies import LEAST_INERTIA, add_bodies, couple
 from cdsm.interchange.mjcf_cables import add_path, pulley_remarks, row, side_sites
 from cdsm.manipulator import Manipulator
+from cdsm.motors import YIELDING_REMEDY, refuse_yielding
 from cdsm.posture import Posture
 from cdsm.report.checks import balance_error
 from cdsm.statics.modes import vibrations
@@ -88,6 +88,9 @@ def to_mjcf(
     keyframe ``pose`` have the joint coordinates of the posture. The model has no leads (straight
     cables before the first site), no friction in the holes, and no wrench: apply it at run time.
     ``actuators`` is one of
+
+    Of motors that move several cables, the comment at the top says which commands belong together,
+    by how much per turn; motors that yield are refused.
 
     - ``length``: one motor per cable keeps its original length, as in :func:`~cdsm.equilibrium`.
       Its force is k (u + L_rest − L), never a push. Its ``ctrl`` u is the length of wire that it
@@ -164,6 +167,8 @@ def mujoco_model(
     """Build the MJCF text of :func:`to_mjcf`, with its settings; the arguments are the same."""
     further = instance("arm", arm, Manipulator).definition.terms
     refuse_terms(further, "a MuJoCo model has no element for its terms")
+    why = "yields, and a model in MuJoCo has rigid motors only"
+    refuse_yielding(arm.motors, "arm", why, YIELDING_REMEDY)
     if (pose is None) != (tension is None):
         raise InvalidInput("tension", "give pose and tension, or neither.")
     if pose is not None and instance("pose", pose, Posture).arm != arm:
@@ -209,6 +214,7 @@ def mujoco_model(
     loaded = K if K is None or actuators != "tension" else _as_force_controlled(K)
     unstable = None if loaded is None or loaded.is_stable else describe_buckling(loaded)
     remarks += [f"actuators  {actuators}: {_CONTROLS[actuators]}"]
+    remarks += [f"motors     {arm.motors.line}; turn them together"] * bool(arm.motors.given)
     remarks += ["friction   of the cables in their holes is left out"]
     remarks += _spring_remarks(arm)
     remarks += pulley_remarks(arm.at(q, check_limits=False), sides) if sides else []
@@ -273,7 +279,7 @@ def _missing(K: Stiffness) -> Iterator[str]:
 def _as_force_controlled(K: Stiffness) -> Stiffness:
     """Return K with the passive part removed, as if all motors controlled force."""
     arm = K.posture.arm
-    free = arm.with_cables([replace(cable, control="force") for cable in arm.cables])
+    free = arm.with_forced(np.ones(len(arm.cables), dtype=np.bool_))
     return stiffness(free.at(K.posture.q, check_limits=False), K.tension, wrench=K.applied)
 
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InfeasibleTension
 from cdsm.measures.holding import Holding, holding_following, holding_locked
 from cdsm.measures.polytope import Farthest, balanced, force_polytope
+from cdsm.motors import refuse_shared
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.stiffness_matrix import checked_tension, stiffness
@@ -176,6 +177,8 @@ def payload(
         motors locked: 52.05 N (5.306 kg), limit: maximum of cable2_1 (100 N)
     """
     instance("pose", pose, Posture)
+    remedy = "weight_test and equilibrium say what it bears with locked motors."
+    refuse_shared(pose.arm.motors, "payload", remedy)
     allowed = checked_quantity("deflection", deflection, "length", infinite=True)
     W = wrench_vector("wrench", wrench)
     bounds = bounds_at(pose, minimum, maximum, worst_friction)

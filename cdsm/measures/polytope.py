@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.applied import required_torque
 from cdsm.errors import CdsmError, InvalidInput, solver_failed
+from cdsm.motors import refuse_shared
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.support.format import coordinates, plural
@@ -129,6 +130,7 @@ def force_polytope(
         50 corners; holds 45.11 N in any direction, least along (0.138, -0.855, 0.5)
     """
     instance("pose", pose, Posture)
+    refuse_shared(pose.arm.motors, "force_polytope")
     bounds = bounds_at(pose, minimum, maximum, worst_friction)
     low = bounds.minimum_held
     high = bounds.maximum_held

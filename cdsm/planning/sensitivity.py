@@ -8,10 +8,11 @@ from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm import readings
 from cdsm.errors import CdsmError, InvalidInput
+from cdsm.motors import refuse_shared
 from cdsm.planning.tension_space import LARGEST_TENSION, form_by_tension, unstable
 from cdsm.posture import Posture
 from cdsm.status import Status
@@ -22,6 +23,7 @@ from cdsm.support.result import Result, unit
 from cdsm.support.validation import NO_WRENCH, Direction, bound, instance, scalar, unit_direction
 from cdsm.support.values import Array, draw, frozen
 from cdsm.tension import Tension, distribute_tension
+from cdsm.terms import passive_stiffness
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,9 +56,15 @@ class StiffnessGradient(Result):
     @cached_property
     def joint(self) -> Array:
         """∂K_θ/∂F (C, nv, nv) [m/rad²]: one symmetric matrix per cable."""
-        J = self.stiffness.posture.length_jacobian
+        J = self._driven
         slope = self.cable_stiffness[:, None, None]
         return frozen(self.stiffness.posture.length_hessian + slope * J[:, :, None] * J[:, None])
+
+    @cached_property
+    def _driven(self) -> Array:
+        """Gradients of the lengths (C, nv) [m/rad], less by how far motors yield."""
+        K = self.stiffness
+        return _driven(K, np.zeros(K.tension.size, dtype=np.bool_))
 
     @cached_property
     def margin(self) -> Array:
@@ -67,7 +75,10 @@ class StiffnessGradient(Result):
         upper bound of the change of λ_min, to first order.
         """
         v = self.stiffness.critical_direction[:, None]
-        return frozen(form_by_tension(self.stiffness.posture, self.cable_stiffness, v, v)[:, 0, 0])
+        form = form_by_tension(
+            self.stiffness.posture, self.cable_stiffness, v, v, driven=self._driven
+        )
+        return frozen(form[:, 0, 0])
 
     @cached_property
     def cartesian(self) -> Array:
@@ -77,7 +88,9 @@ class StiffnessGradient(Result):
         """
         slope = self.cable_stiffness
         return frozen(
-            self._through(np.eye(3), self.stiffness.cartesian, self.stiffness.joint, slope)
+            self._through(
+                np.eye(3), self.stiffness.cartesian, self.stiffness.joint, slope, self._driven
+            )
         )
 
     def along(self, direction: Direction) -> Array:
@@ -95,11 +108,16 @@ class StiffnessGradient(Result):
         along, motion = K.tip_response(u)
         loose = K.loose(motion)
         k = np.where(loose, K.cable_stiffness, 0.0)
-        taut = readings.remove_cables(K.joint, K.posture.length_jacobian, k)
+        J = K.posture.length_jacobian
+        taut = readings.remove_cables(K.joint, J, k)
+        soft = K.posture.arm.motors.yielding
+        if soft is not None:
+            taut = K.joint - K.passive + passive_stiffness(J, K.cable_stiffness - k, soft)
         slope = np.where(loose, 0.0, self.cable_stiffness)
-        return frozen(self._through(u[None], np.array([[along]]), taut, slope)[:, 0, 0])
+        driven = _driven(K, loose)
+        return frozen(self._through(u[None], np.array([[along]]), taut, slope, driven)[:, 0, 0])
 
-    def _through(self, U: Array, X: Array, K: Array, slope: Array) -> Array:
+    def _through(self, U: Array, X: Array, K: Array, slope: Array, driven: Array) -> Array:
         """Return Mᵀ ∂K_θ/∂F M (C, r, r), the derivative of X = (U C_vv Uᵀ)⁻¹ (r, r).
 
         M = K_θ⁻¹ (U J_v)ᵀ X is the joint motion per motion of the tip. The left one is of
@@ -108,7 +126,7 @@ class StiffnessGradient(Result):
         rows = U @ self.stiffness.posture.jacobian[:3]
         left = np.linalg.solve(K.T, rows.T) @ X.T
         right = np.linalg.solve(K, rows.T) @ X
-        return form_by_tension(self.stiffness.posture, slope, left, right)
+        return form_by_tension(self.stiffness.posture, slope, left, right, driven=driven)
 
     def __str__(self) -> str:
         arm = self.stiffness.posture.arm
@@ -120,11 +138,24 @@ class StiffnessGradient(Result):
         return "\n".join(["change per 1 N of tension in one cable", *aligned(rows)])
 
 
+def _driven(K: Stiffness, loose: NDArray[np.bool_]) -> Array:
+    """Compute Pᵀ J_L (C, nv) [m/rad] with K_eff = P K_L, of which some cables are ``loose`` (C,).
+
+    dK_eff = P dK_L Pᵀ: these are the gradients of the lengths if all motors are rigid, P = 1.
+    """
+    soft = K.posture.arm.motors.yielding
+    J = K.posture.length_jacobian
+    if soft is None:
+        return J
+    return np.asarray(soft.transmission(np.where(loose, 0.0, K.cable_stiffness)).T @ J)
+
+
 def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
     """Compute the derivatives of a stiffness K with respect to the cable tensions.
 
     ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ, with the gradient J_c and the Hessian H_c of the length of
-    cable c and k′_c = dk_c/dF_c. k′_c includes dEA/dF and the series spring. For example,
+    cable c and k′_c = dk_c/dF_c. k′_c includes dEA/dF and the series spring. Where motors yield,
+    J_c is that of Pᵀ J_L, with K_eff = P K_L (:attr:`Stiffness.wire_stiffness`). For example,
     ``stiffness_gradient(K).along(u)`` is the gradient of ``K.along(u)``.
 
     Raises:
@@ -250,6 +281,7 @@ def saturation(
     """
     arm = instance("pose", pose, Posture).arm
     u = unit_direction("direction", direction)
+    refuse_shared(arm.motors, "saturation")
     part = scalar("fraction", fraction)
     start = scalar("minimum", minimum)
     if not 0.0 < part <= 1.0:

@@ -23,6 +23,7 @@ from scipy.optimize import brentq, minimize
 from cdsm import readings
 from cdsm.applied import required_torque
 from cdsm.errors import ElasticityRangeError, InfeasibleTension, SingularStiffness
+from cdsm.motors import YIELDING_REMEDY, refuse_shared, refuse_yielding
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.verdict import describe_buckling
@@ -85,6 +86,9 @@ class TensionSpace:
         wrench: ArrayLike,
     ) -> None:
         self.pose = instance("pose", pose, Posture)
+        refuse_shared(pose.arm.motors, "plan")
+        why = "yields, and plans know rigid motors only"
+        refuse_yielding(pose.arm.motors, "plan", why, YIELDING_REMEDY)
         self.directions = directions.reshape(-1, 3)
         self.least = _least_tension_within_laws(pose, minimum, maximum, wrench)
         low = self.least.minimum_held
@@ -316,13 +320,16 @@ def affine(function: Function, factor: float, constant: float = 0.0) -> Function
     return scaled
 
 
-def form_by_tension(pose: Posture, slope: Array, left: Array, right: Array) -> Array:
+def form_by_tension(
+    pose: Posture, slope: Array, left: Array, right: Array, driven: Array | None = None
+) -> Array:
     """Compute leftᵀ (∂K_θ/∂F_c) right (C, a, b) for ``left`` (nv, a) and ``right`` (nv, b).
 
     ``slope`` (C,) [1/m] are the derivatives of the cable stiffnesses with respect to the tensions.
+    ``driven`` (C, nv) is in the place of J_L where motors yield.
     """
     H = pose.length_hessian
-    J = pose.length_jacobian
+    J = pose.length_jacobian if driven is None else driven
     pairs = (left[:, None, :, None] * right[:, None]).reshape(H[0].size, -1)
     active = (H.reshape(len(H), -1) @ pairs).reshape(-1, left.shape[1], right.shape[1])
     passive = slope[:, None, None] * (J @ left)[:, :, None] * (J @ right)[:, None]

@@ -7,8 +7,6 @@ by a small rotation takes its place.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.differentiate import jacobian
 from scipy.linalg import null_space
@@ -117,7 +115,8 @@ def compared(K: Stiffness) -> tuple[Comparison, ...]:
 def _terms(K: Stiffness) -> tuple[Term, ...]:
     """Return the terms of the energy, with K's posture as their reference, in the order of K."""
     pose = K.posture
-    stretch = Stretch(K.tension, K.cable_stiffness, K.free_lengths, pose.cable_lengths)
+    wires = K.tension, K.cable_stiffness, K.free_lengths, pose.cable_lengths
+    stretch = Stretch(*wires, motors=pose.arm.motors.yielding)
     return ConstantPull(K.tension), stretch, *without_cables(pose, K.applied, pose)
 
 
@@ -145,8 +144,7 @@ def _batch_comparison(K: Stiffness, names: list[str], matrices: Array, most: flo
         return _compare("batch", matrices, matrices, 0.0, most, f"no kernel for {listed(lacking)}")
     slack = (K.tension == 0.0) & (K.cable_stiffness == 0.0)
     if slack.any():  # in an equilibrium, slack cables give nothing
-        pairs = zip(arm.cables, slack, strict=True)
-        arm = arm.with_cables([replace(b, control="force") if free else b for b, free in pairs])
+        arm = arm.with_forced(slack)
     q = K.posture.q[None]
     batch = evaluate(arm, q, K.tension, K.wrench, names, check_limits=False)
     values = np.array([batch[name][0] for name in names]) * unit[:, None] * unit

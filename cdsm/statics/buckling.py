@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from cdsm.batch.evaluation import evaluate
 from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput, warn
 from cdsm.geometry.beams import buckling_doubt
+from cdsm.motors import refuse_shared
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.result import Result, quantity, unit
@@ -31,6 +32,7 @@ _LOWEST = 1e-3  # lowest bound of a scan from zero [N]; or over its end, if that
 _LARGEST = 1e6  # end of doubled load factors
 _ROUNDING = 1e-7  # a smaller factor is that of the balance, which solvers accept to 1e-9
 _SHOWN = 10.0  # largest load factor of the curve if the critical one is infinite
+_LOCKED = "weight_test (cdsm weigh) says where it buckles with locked motors."
 Limit = Literal["buckling", "infeasible", "elasticity", "none"]
 
 
@@ -182,6 +184,7 @@ def critical_tension(
     from scipy.optimize import brentq  # slow to import
 
     arm = instance("pose", pose, Posture).arm
+    refuse_shared(arm.motors, "critical_tension", _LOCKED)
     W = wrench_vector("wrench", wrench)
     if arm.is_serpentine and (doubt := buckling_doubt(arm.geometry.joints)):
         warn(doubt)
@@ -258,6 +261,7 @@ def critical_load(
         '556.2 N'
     """
     count = len(instance("pose", pose, Posture).arm.cables)
+    refuse_shared(pose.arm.motors, "critical_load", _LOCKED)
     multiplied = wrench_vector("load", load)
     always = wrench_vector("wrench", wrench)
     low = bound("minimum", minimum, count)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -130,6 +131,14 @@ class Equilibrium(Result, Loaded):
         """Where cables slide now (P,), as :attr:`LoadHistory.sliding`; None without friction."""
         return None if self.path is None else self.path.sliding[-1]
 
+    @property
+    def motor_turns(self) -> Array:
+        """By how far motors yield (M,) [rad], in the order of ``arm.motors``; 0: rigid ones.
+
+        They turn from where they were locked; a positive turn takes in wire of positive radii.
+        """
+        return frozen(self.model.turns(self.pose))
+
     @quantity("m", "axis")
     def displacement(self) -> Array:
         """Displacement of the tip from the reference (3,) [m]."""
@@ -246,7 +255,10 @@ class Equilibrium(Result, Loaded):
         F = self.tension
         if self.motors == "tension":
             return np.zeros(F.size)
-        more = self.stiffness.free_lengths - pose.arm.laws.original_lengths(pose.cable_lengths, F)
+        lengths = pose.cable_lengths
+        if pose.arm.motors.yielding is not None:
+            lengths = lengths + pose.arm.motors.matrix @ self.motor_turns
+        more = self.stiffness.free_lengths - pose.arm.laws.original_lengths(lengths, F)
         return np.where(F == 0.0, np.maximum(more, 0.0), 0.0)
 
     @property
@@ -322,7 +334,10 @@ class Equilibrium(Result, Loaded):
     def to_dict(self) -> dict[str, object]:
         """Return the numbers in SI for JSON; with friction, those of segments and holes too."""
         if self.path is None:
-            return super().to_dict()
+            motors = self.pose.arm.motors
+            turns = dict(zip(motors.names, self.motor_turns, strict=True))
+            yielded = {} if motors.yielding is None else {"motor_turn_rad": turns}
+            return merged(super().to_dict(), prepare_json(yielded))
         labels = self.path.segment_names
         followed = {
             "segment_tension_N": dict(zip(labels, self.path.segment_tensions[-1], strict=True)),
@@ -330,6 +345,15 @@ class Equilibrium(Result, Loaded):
             "snapped": bool(self.path.snaps.any()),
         }
         return merged(super().to_dict(), prepare_json(followed))
+
+    def _yielded(self) -> list[str]:
+        """Return a line that says which motors yield by how far."""
+        motors = self.pose.arm.motors
+        if motors.yielding is None:
+            return []
+        turns = zip(motors.names, self.motor_turns, strict=True)
+        turned = [f"{name} by {math.degrees(x):.3g}°" for name, x in turns if x]
+        return [f"motors yield: {listed(turned, MOST_JOINTS) or 'none turns'}"]
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Plot the arm in mm, with tensions, compliance, load, and its reference if that is near.
@@ -366,6 +390,7 @@ class Equilibrium(Result, Loaded):
             if self.motors == "locked"
             else "motors hold the tensions: cables add no stiffness of their own"
         )
+        lines += self._yielded()
         worst = int(abs(self.residual * arm.levers).argmax())
         residual = f"{abs(self.residual[worst]):.1e} {arm.torque_unit(worst)}"
         state = "; ".join(self.warnings) or self.verdict.word
@@ -419,9 +444,7 @@ def with_forced(pose: Posture, forced: NDArray[np.bool_]) -> Posture:
     """Return a posture, of an arm of which the motors of cables ``forced`` (C,) hold tensions."""
     if not forced.any():
         return pose
-    pairs = zip(pose.arm.cables, forced, strict=True)
-    cables = [replace(cable, control="force") if is_forced else cable for cable, is_forced in pairs]
-    return pose.arm.with_cables(cables).at(pose.q, check_limits=False)
+    return pose.arm.with_forced(forced).at(pose.q, check_limits=False)
 
 
 def settled(arm: LockedArm, start: Posture, reached: float = 0.0) -> Point:

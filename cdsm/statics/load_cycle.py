@@ -233,7 +233,10 @@ def load_cycle(
         motors: Commands of the motors at each load (n, C): for a position-controlled cable the rest
             length (at zero strain) of wire taken in since the reference [m], positive if the motor
             pulls; for a force-controlled cable its tension [N]. Default: 0 m, and the tension F at
-            the reference. A motor cannot take in all wire of its cable.
+            the reference. A motor cannot take in all wire of its cable. With motors that move
+            several cables (n, M), in the order of ``arm.motors.names``: the turn since the
+            reference [rad]. A motor that holds a torque keeps that of the reference; its command is
+            0. Motors that yield are refused with friction.
         substeps: Number of equal steps between two loads, from 1 to 1000. A step is exact if no
             hole stops sliding within it. With 4, the tips of random arms are off by 1 % of the
             largest displacement at worst, half of them by less than 0.03 %; the dissipated work is
@@ -291,7 +294,8 @@ def follow_loads(
     commands = np.tile(state.load.motors, (len(loads), 1))
     if motors is not None:
         wire = np.add.reduceat(state.arm_state.chain.rest_length, arm.start[:-1])
-        commands = _commands(motors, pose, commands.shape, wire)
+        taken = _taken_in(motors, pose, len(loads)) if pose.arm.motors.given else motors
+        commands = _commands(taken, pose, commands.shape, wire)
     goals = [
         Approach(wrench, command, substeps, f"the step to load {k}")
         for k, (wrench, command) in enumerate(zip(loads, commands, strict=True))
@@ -378,6 +382,24 @@ def approach(
         snaps=frozen(np.array([step.snapped for step in steps])),
     )
     return history, tuple(step.path for step in steps)
+
+
+def _taken_in(motors: ArrayLike, pose: Posture, count: int) -> Array:
+    """Return the wire of each cable that turns of all motors (n, M) take in, (n, C) [m].
+
+    Motors of single cables have their own commands.
+    """
+    drives = pose.arm.motors
+    turns = number_array("motors", motors)
+    if turns.shape != (count, len(drives)):
+        needed = f"for each load one command per motor, {', '.join(drives.names)}"
+        problem = f"shape {turns.shape} given, {(count, len(drives))} needed: {needed}."
+        raise InvalidInput("motors", problem)
+    for motor, column in zip(drives.given, turns.T, strict=False):
+        if motor.control == "torque" and column.any():
+            problem = f"{motor.name} holds its torque in a load cycle; give 0 for it."
+            raise InvalidInput("motors", problem)
+    return np.asarray(turns @ drives.matrix.T)
 
 
 def _commands(motors: ArrayLike, pose: Posture, shape: tuple[int, ...], wire: Array) -> Array:

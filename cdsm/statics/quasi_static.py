@@ -17,6 +17,7 @@ import numpy as np
 
 from cdsm.applied import Applied, between, without_cables
 from cdsm.friction.capstan import ChainProblem, ChainState, chain_tangent
+from cdsm.motors import refuse_rough
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm, require_domain
 from cdsm.statics.solve import ArmState, Balance, Point, continued, settle
@@ -86,6 +87,9 @@ class QuasiStaticArm:
         self.start = reference.segments.chains.start
         self.forced = ~arm.cables.position_controlled
         self._problem = ChainProblem(arm.cables, self.start)
+        refuse_rough(arm.motors, arm.has_friction, "friction")
+        self._soft = arm.motors.yielding
+        self._torque = None if self._soft is None else self._soft.matrix.T @ tension
 
     def initial(
         self, wrench: Applied, slack: Array | float = 0.0, tension: Array | None = None
@@ -181,15 +185,49 @@ class QuasiStaticArm:
         chains = segments.chains
         J = segments.length_jacobian
         forced = np.where(self.forced, load.motors, np.nan)
-        chain = self._problem.settle(segments.lengths, rest_length, segments.ratio, forced, near)
+        lengths = segments.lengths
+        if self._soft is not None:
+            lengths = self._pulled(lengths, rest_length, forced, near)
+        chain = self._problem.settle(lengths, rest_length, segments.ratio, forced, near)
         turning = np.zeros_like(J)
         T = chain.tension
         turning[chains.hole] = chains.friction[:, None] * segments.wrap_jacobian
         slope = chain_tangent(self.start, self.forced, chain, J, turning)
+        if self._soft is not None:
+            by_motors = self._by_motors(chain)
+            k = by_motors[self.start[:-1]].diagonal()
+            slope = slope - by_motors @ self._soft.yielded(slope[self.start[:-1]], k)
         K = segments.active(T) + J.T @ slope + stiffness_of(terms, pose)
         residual = T @ J + torque_of(terms, pose)
         scale = T @ abs(J) + torque_size_of(terms, pose)
         return ChainArmState(pose, T, residual, K, scale, chain, slope)
+
+    def _pulled(self, lengths: Array, rest_length: Array, forced: Array, near: Array) -> Array:
+        """Return lengths (S,) of segments, the first of each cable longer as motors yield."""
+        soft = self._soft
+        assert soft is not None
+        assert self._torque is not None
+        first = self.start[:-1]
+
+        def longer(more: Array) -> Array:
+            pulled = lengths.copy()
+            pulled[first] += more
+            return pulled
+
+        def law(more: Array) -> tuple[Array, Array]:
+            smooth = np.ones(lengths.size)
+            chain = self._problem.settle(longer(more), rest_length, smooth, forced, near)
+            k = self._by_motors(chain)[first].diagonal()
+            return chain.tension[first], np.where(chain.tension[first] > 0.0, k, 0.0)
+
+        turn, _, _ = soft.settle(law, self._torque, np.zeros(self._torque.size))
+        return longer(soft.matrix @ turn)
+
+    def _by_motors(self, chain: ChainState) -> Array:
+        """Compute ∂T/∂L (S, C) [N/m] by how much longer motors make the cables."""
+        ends = np.zeros((chain.tension.size, len(self.start) - 1))
+        ends[self.start[:-1], np.arange(len(self.start) - 1)] = 1.0
+        return chain_tangent(self.start, self.forced, chain, ends, np.zeros_like(ends))
 
     def _jumps(self, state: ChainArmState) -> Array:
         """Return the work per slip (S,) [N] that the hole after each segment dissipates."""

@@ -78,7 +78,7 @@ def assemble(
     free_length: Array | None = None,
 ) -> Stiffness:
     """Compute K_θ (Eq. 16) from checked, read-only arrays; :class:`Stiffness` explains them."""
-    stretch = Stretch(tension, cable_stiffness)
+    stretch = Stretch(tension, cable_stiffness, motors=pose.arm.motors.yielding)
     summands: tuple[Term, ...] = ConstantPull(tension), stretch, *without_cables(pose, wrench)
     terms = {term.name: frozen(term.stiffness(pose)) for term in summands}
     return Stiffness(

@@ -100,7 +100,8 @@ def notes(K: Stiffness) -> tuple[str, ...]:
             missing = [f"{fixed}; cartesian: in the plane of other axes"]
     stiffness = f"smallest joint stiffness {least_joint_stiffness(K)}"
     least = f"{K.verdict.word}, {stiffness} ({model_of(K)})"
-    return (*missing, *texts(K.applied), least)
+    line = K.posture.arm.motors.line
+    return (*missing, *texts(K.applied), *([line] if line else []), least)
 
 
 def model_of(K: Stiffness) -> str:
@@ -119,7 +120,10 @@ def frictionless_model(arm: Manipulator) -> str:
         any(link.bending_stiffness for link in arm.geometry.links)
         or any(joint.bending_stiffness for joint in arm.geometry.joints)
     )
-    return MODEL.replace("rigid links", "links that bend") if bends else MODEL
+    model = MODEL.replace("rigid links", "links that bend") if bends else MODEL
+    if arm.motors.yielding is not None:
+        model = model.replace(", tangent", ", motors that yield, tangent")
+    return model
 
 
 def axis_of(u: Array) -> str:

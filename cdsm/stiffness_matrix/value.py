@@ -20,6 +20,7 @@ from cdsm import readings
 from cdsm.applied import Applied, Loaded, described, required_torque
 from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.loads import link_point
+from cdsm.motors import Yielding
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints
 from cdsm.stiffness_matrix.report import Report
@@ -37,7 +38,7 @@ from cdsm.support.result import Result, quantity, tabulated, unit_of
 from cdsm.support.validation import Direction, one_of, unit_direction, unit_directions
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
-from cdsm.terms import CABLE_TERMS
+from cdsm.terms import CABLE_TERMS, passive_stiffness
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,8 +65,8 @@ class Stiffness(Result, Loaded):
         joint: K_θ, sum of the terms (nv, nv) [N m/rad]: row torque, column angle.
         tension: F (C,) [N].
         applied: What acts: W (6,) at the tip, or loads on links.
-        cable_stiffness: Diagonal of K_L (C,) [N/m], of cables without friction; 0 for
-            force-controlled ones.
+        cable_stiffness: Diagonal of K_L (C,) [N/m], of cables without friction and without their
+            motors; 0 for force-controlled ones.
         free_length: l_0 (C,) [m] held since another posture; None if motors are locked at this one.
         distribution: The :class:`~cdsm.Tension` that gave the tensions; None for your own.
         friction: ``"frictionless"``; ``"stuck"``: the cables stick in all holes with friction;
@@ -105,8 +106,8 @@ class Stiffness(Result, Loaded):
     def passive(self) -> Array:
         """J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic.
 
-        With friction it is Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the cable segments j, not symmetric if
-        cables slide.
+        Where motors yield, :attr:`wire_stiffness` is in the place of K_L. With friction it is
+        Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the cable segments j, not symmetric if cables slide.
         """
         return self.terms["passive"]
 
@@ -124,6 +125,28 @@ class Stiffness(Result, Loaded):
     def springs(self) -> Array:
         """Of the joint springs (nv, nv) [N m/rad]: diag k, or Sᵀ diag k S of coupled joints."""
         return self.terms["springs"]
+
+    @property
+    def motor_compliance(self) -> Array:
+        """B k_m⁻¹ Bᵀ (C, C) [m/N]: how much longer the motors make the cables per tension.
+
+        It is 0 for rigid motors, and ±inf between cables of a motor that holds its torque.
+        """
+        return self.posture.arm.motors.compliance
+
+    @cached_property
+    def wire_stiffness(self) -> Array:
+        """K_eff = (K_L⁻¹ + B k_m⁻¹ Bᵀ)⁻¹ (C, C) [N/m]: tensions per elongation of the cables.
+
+        It is diag k of :attr:`cable_stiffness` if no motor yields.
+        """
+        if self._yielding is None:
+            return frozen(np.diag(self.cable_stiffness))
+        return frozen(self._yielding.effective(self.cable_stiffness))
+
+    @property
+    def _yielding(self) -> Yielding | None:
+        return self.posture.arm.motors.yielding
 
     @property
     def free_lengths(self) -> Array:
@@ -174,8 +197,12 @@ class Stiffness(Result, Loaded):
     @cached_property
     def without_slack(self) -> Array:
         """K_θ without the stiffness of the cables at 0 N (nv, nv) [N m/rad]."""
+        J = self.posture.length_jacobian
         k = np.where(self._slack, self.cable_stiffness, 0.0)
-        return frozen(readings.remove_cables(self.joint, self.posture.length_jacobian, k))
+        if self._yielding is None:
+            return frozen(readings.remove_cables(self.joint, J, k))
+        taut = passive_stiffness(J, self.cable_stiffness - k, self._yielding)
+        return frozen(self.joint - self.passive + taut)
 
     @property
     def margin_without_slack(self) -> float:
@@ -192,7 +219,12 @@ class Stiffness(Result, Loaded):
 
     def loose(self, motion: Array) -> NDArray[np.bool_]:
         """Return which cables at 0 N a motion (nv,) of the joints does not stretch (C,)."""
-        return readings.loose_cables(self.posture.length_jacobian, self._slack, motion)
+        J = self.posture.length_jacobian
+        if self._yielding is None or not self.slack:
+            return readings.loose_cables(J, self._slack, motion)
+        turn = self._yielding.turns_for(J @ motion, self.cable_stiffness, self._slack)
+        both = np.concatenate([J, self._yielding.matrix], axis=1)
+        return readings.loose_cables(both, self._slack, np.append(motion, turn))
 
     @cached_property
     def _slack(self) -> NDArray[np.bool_]:
@@ -401,13 +433,19 @@ class Stiffness(Result, Loaded):
 
     def _one_sided_response(self, torque: Array, joints: Joints) -> tuple[float, Array]:
         """Compute what :meth:`tip_response` does, of cables at 0 N that can only add tension."""
-        k = np.where(self._slack, self.cable_stiffness, 0.0)
+        K = self.joint[joints][:, joints]
+        magnitudes = self.magnitudes[joints][:, joints]
+        J = self.posture.length_jacobian[:, joints]
+        forces = torque
+        if self._yielding is not None:
+            K, magnitudes, J = self._yielding.extended(K, magnitudes, J, self.cable_stiffness)
+            forces = np.append(torque, np.zeros(len(K) - torque.size))
         along, motion, buckles = readings.one_sided_along(
-            self.joint[joints][None, :, joints],
-            self.magnitudes[joints][None, :, joints],
-            self.posture.length_jacobian[None, :, joints],
-            k[None],
-            torque[None, None],
+            K[None],
+            magnitudes[None],
+            J[None],
+            np.where(self._slack, self.cable_stiffness, 0.0)[None],
+            forces[None, None],
             np.ones((1, 1), dtype=np.bool_),
         )
         if buckles[0]:
@@ -421,7 +459,7 @@ class Stiffness(Result, Loaded):
                 "tensions, or change the posture.",
                 frozen(least),
             )
-        return float(along[0, 0]), motion[0, 0]
+        return float(along[0, 0]), motion[0, 0, : torque.size]
 
     def _cartesian_in(self, U: Array | None) -> Array:
         """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m] of orthonormal directions U (n, 3), or of all."""
@@ -470,7 +508,10 @@ class Stiffness(Result, Loaded):
         motion = moved * along
         if self.segment_tension is None or self.tension_gradient is None:
             k = np.where(self.loose(motion), 0.0, self.cable_stiffness)
-            passive = k * (self.posture.length_jacobian @ motion) ** 2
+            longer = self.posture.length_jacobian @ motion
+            passive = k * longer**2
+            if self._yielding is not None:
+                passive = longer * (self._yielding.effective(k) @ longer)
             active = self.tension * (self.posture.length_hessian @ motion @ motion)
         else:
             segments = self.posture.segments
@@ -531,8 +572,13 @@ class Stiffness(Result, Loaded):
 
     def to_dict(self) -> dict[str, object]:
         """Return the stiffness in SI for JSON, units in the keys; None for what does not exist."""
-        loads = {"loads": described(self.applied)} if described(self.applied) else {}
-        return merged(super().to_dict(), prepare_json(prints.readings(self) | loads))
+        more: dict[str, object] = {}
+        if loads := described(self.applied):
+            more["loads"] = loads
+        if self.posture.arm.motors.given:
+            more["drives"] = self.posture.arm.motors.to_dict()
+            more["wire_stiffness_N_per_m"] = self.wire_stiffness
+        return merged(super().to_dict(), prepare_json(prints.readings(self) | more))
 
     def __str__(self) -> str:
         return "\n".join([*self.warnings, *prints.table(self), *prints.notes(self)])

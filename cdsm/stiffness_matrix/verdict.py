@@ -134,8 +134,13 @@ def judge_stiffness(K: Stiffness) -> Verdict:
             *find_doubts(K.posture),
             *find_imbalance(K.posture.arm, imbalance, K.residual),
             *find_excess(K.posture.arm, K.tension),
+            *map(_note, () if K.distribution is None else K.distribution.warnings),
         ]
     )
+
+
+def _note(sentence: str) -> Finding:
+    return Finding(Status.OK, sentence)
 
 
 def imbalance_of(pose: Posture, tension: Array, wrench: Applied, residual: Array) -> Imbalance:

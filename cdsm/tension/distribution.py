@@ -14,6 +14,7 @@ from cdsm.applied import Applied, Loaded, required_torque
 from cdsm.cable import breaking_forces, largest_share
 from cdsm.errors import InvalidInput, solver_failed
 from cdsm.loads import LoadsLike, loads_of
+from cdsm.motors import needs_assembly
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.support.format import aligned
@@ -98,6 +99,12 @@ class Tension(Result, Loaded, IndexedByName):
         return np.array(self.values, dtype) if copy else np.asarray(self.values, dtype)
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence if motors move several cables, and cannot give all of these tensions."""
+        motors = self.posture.arm.motors
+        return () if motors.are_free else (needs_assembly(motors),)
+
+    @property
     def at_minimum(self) -> tuple[str, ...]:
         """Names of the cables at the lower bound that held."""
         return self._names(self.values - self.minimum_held)
@@ -111,6 +118,10 @@ class Tension(Result, Loaded, IndexedByName):
         tight = distance <= OPTIMALITY * self.values.max(initial=0.0)
         return tuple(self.keys()[c] for c in np.flatnonzero(tight))
 
+    def to_dict(self) -> dict[str, object]:
+        """Return all numbers in SI for JSON, and the warnings, if there are any."""
+        return {**super().to_dict(), **({"warnings": [*self.warnings]} if self.warnings else {})}
+
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Plot the tension [N] of each cable as a bar, with its bounds, and return the axes.
 
@@ -123,7 +134,8 @@ class Tension(Result, Loaded, IndexedByName):
         rows = aligned([("cable", "tension [N]"), *((c, f"{self[c]:.3f}") for c in self)])
         unit = self.posture.arm.torque_unit()
         rows += [share] if (share := largest_share(self.posture.arm.cables, self.values)) else []
-        return "\n".join([*rows, f"static residual: {abs(self.residual).max():.1e} {unit}"])
+        rows.append(f"static residual: {abs(self.residual).max():.1e} {unit}")
+        return "\n".join([*self.warnings, *rows])
 
 
 def distribute_tension(

@@ -1,0 +1,469 @@
+"""Motors that move several cables: a spool of a pair, a drum of twins, coupled spools.
+
+A motor is one more coordinate φ. B (C, M) is the wire of each cable that a motor takes in per turn:
+where the motors turn by φ, cable c is as if it were longer by (B φ)_c, and the torque of the motors
+is Bᵀ F. With K_L = diag k,
+
+    dF = K_L (J_L dθ + B dφ);   rigid: dφ = 0;   compliant: Bᵀ dF = −k_m dφ;   torque held: k_m = 0.
+
+So the cables of motors that yield have one stiffness together, a full matrix,
+
+    dF = K_eff J_L dθ,     K_eff = K_L − K_L B (k_m + Bᵀ K_L B)⁻¹ Bᵀ K_L = (K_L⁻¹ + B k_m⁻¹ Bᵀ)⁻¹
+
+with the columns of rigid motors left out of B. The passive term of K_θ is J_Lᵀ K_eff J_L.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple, final, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.cable import Cable, Cables
+from cdsm.errors import CdsmError, InvalidInput, listed
+from cdsm.status import Status
+from cdsm.support.format import aligned, plural
+from cdsm.support.validation import (
+    RANGES,
+    check_numbers,
+    number,
+    one_of,
+    scalar,
+    sequence_of,
+    text,
+    within,
+)
+from cdsm.support.values import Array, Printed, frozen
+
+MotorControl = Literal["position", "torque"]
+
+_RANK = 1e-9  # motors are dependent below this singular value of B with columns of unit length
+_REGULAR = 1e-12  # k_m + Bᵀ K_L B is singular below this part of its scaled size
+_SETTLED = 1e-13  # largest torque that is rounding, over that of the motors
+_SHORT = 1e-3  # length [m] whose rounding counts
+_STALLED = 1e-10  # the same where no step makes it smaller: laws are inverted to 1e-13
+_STEPS = 200  # most steps of the search for the turns of motors
+
+TensionLaw = Callable[[Array], tuple[Array, Array]]
+"""Tensions F (C,) [N] and their slopes dF/dL (C,) [N/m] of cables that are longer by (C,) [m]."""
+
+
+@final
+@dataclass(frozen=True)
+class Motor:
+    """A motor that moves one cable or several, which then share its torque and its compliance.
+
+    Attributes:
+        name: Unique name, not that of a cable.
+        cables: Radius [m] of the drum of each cable by the cable's name: wire taken in per turn.
+            A negative one lets wire out: ``{"left": 0.012, "right": -0.012}`` is a spool with two
+            cables against each other. A cable may hang on several motors.
+        stiffness: k_m [N m/rad] of gears and servo loop; inf: it holds its angle exactly.
+        control: What it keeps constant: ``"position"``: its angle; ``"torque"``: its torque Bᵀ F,
+            by which it yields to every change of length that leaves its torque.
+
+    Raises InvalidInput, which names the motor and the fault.
+
+    Example:
+        >>> import cdsm
+        >>> pair = cdsm.Motor("m1", {"cable1_1": 0.012, "cable1_2": -0.012}, stiffness=20.0)
+        >>> arm = cdsm.presets.virtual_prototype().with_motors([pair])
+        >>> arm.motors.count, arm.motors.matrix[:3, 0].tolist()
+        ('14 motors for 15 cables', [0.012, -0.012, 0.0])
+    """
+
+    name: str
+    cables: Mapping[str, float]
+    stiffness: float = number("spring", math.inf, infinite=True)
+    control: MotorControl = "position"
+
+    def __post_init__(self) -> None:
+        text("name", self.name)
+        try:
+            one_of("control", self.control, get_args(MotorControl))
+            if self.control == "position" and self.stiffness == 0.0:
+                raise CdsmError("stiffness: 0 N m/rad holds no angle; give control='torque'.")
+            check_numbers(self)
+            if self.control == "torque" and math.isfinite(self.stiffness):
+                raise CdsmError(
+                    "stiffness: a motor with control='torque' has none; leave one of them out."
+                )
+            self.__dict__["cables"] = _checked_radii(self.cables)
+        except CdsmError as error:
+            raise InvalidInput(f"motor {self.name!r}", str(error)) from None
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.stiffness, self.control, *self.cables.items()))
+
+    @property
+    def yields(self) -> bool:
+        """Whether it turns as its torque changes: it is compliant, or holds a torque."""
+        return self.control == "torque" or math.isfinite(self.stiffness)
+
+    def __str__(self) -> str:
+        radii = ", ".join(f"{cable} {1e3 * r:+.4g} mm" for cable, r in self.cables.items())
+        return f"{self.name} ({radii}): {self.holds}"
+
+    @property
+    def holds(self) -> str:
+        """What it holds, in words: its angle, with which stiffness, or its torque."""
+        if self.control == "torque":
+            return "holds its torque"
+        if math.isinf(self.stiffness):
+            return "holds its angle"
+        return f"holds its angle by {self.stiffness:.4g} N m/rad"
+
+
+def _checked_radii(cables: object) -> dict[str, float]:
+    if not isinstance(cables, Mapping):
+        raise CdsmError(f"cables: {cables!r} given; give a dict of radii [m] by cable.")
+    if not cables:
+        raise CdsmError("cables: none given; a motor moves one cable or more.")
+    radii: dict[str, float] = {}
+    for cable, value in cables.items():
+        name = f"radius of {text('cable', cable)}"
+        radius = scalar(name, value)
+        if radius == 0.0:
+            raise CdsmError(f"{name}: 0 m takes in no wire; leave the cable out.")
+        if problem := within("length", abs(radius)):
+            raise CdsmError(f"{name}: {problem}.")
+        radii[cable] = radius
+    return radii
+
+
+def checked_motors(motors: Motor | Sequence[Motor], cables: Cables) -> tuple[Motor, ...]:
+    """Return motors of these cables; InvalidInput if one does not fit them, or repeats others."""
+    several = sequence_of("motors", [motors] if isinstance(motors, Motor) else motors, Motor)
+    names = Counter([motor.name for motor in several])
+    for motor in several:
+        if names[motor.name] > 1:
+            where = f"motor {motor.name!r}"
+            raise InvalidInput(where, "the name is used twice; every motor needs its own.")
+        require_cables(motor, cables)
+    Motors(several, cables).require_independent()
+    return several
+
+
+def require_cables(motor: Motor, cables: Cables) -> None:
+    """Raise InvalidInput if a motor moves a cable that does not exist, or controls force."""
+    where = f"motor {motor.name!r}"
+    if motor.name in cables.names:
+        raise InvalidInput(where, "is the name of a cable; give the motor another one.")
+    for name in motor.cables:
+        one_of(f"cable of {where}", name, cables.names)
+        _require_plain(where, cables[name])
+
+
+def _require_plain(where: str, cable: Cable) -> None:
+    """Refuse what belongs to the motor, but is set at one of its cables."""
+    if cable.control == "force":
+        problem = f"{cable.name} has control='force', which belongs to its motor: "
+        raise InvalidInput(where, f"{problem}give the motor control='torque'.")
+    if cable.gain != 1.0:
+        problem = f"{cable.name} has gain = {cable.gain:g}, which belongs to its motor: "
+        raise InvalidInput(where, f"{problem}change the radius of this cable.")
+
+
+class Yielding(NamedTuple):
+    """The m motors of an arm that yield, with their cables.
+
+    Arrays of cables may have further axes before, as rows of a batch.
+    """
+
+    names: tuple[str, ...]
+    matrix: Array  # B (C, m) [m/rad]
+    stiffness: Array  # k_m (m,) [N m/rad]; 0: the motor holds its torque
+
+    def of_motors(self, k: Array) -> Array:
+        """Compute k_m + Bᵀ K_L B (…, m, m) [N m/rad] from the stiffness k (…, C) of the cables."""
+        B = self.matrix
+        return np.asarray(np.diag(self.stiffness) + (B.T * k[..., None, :]) @ B)
+
+    def softening(self, J: Array, k: Array) -> Array:
+        """Compute J_Lᵀ (K_L − K_eff) J_L (…, nv, nv) [N m/rad] from J_L (…, C, nv)."""
+        pulled = (self.matrix.T * k[..., None, :]) @ J
+        return np.asarray(pulled.swapaxes(-1, -2) @ _inverse(self.of_motors(k)) @ pulled)
+
+    def effective(self, k: Array) -> Array:
+        """Compute K_eff (C, C) [N/m]: tensions per elongation of the cables with their motors."""
+        return np.asarray(np.diag(k) - self.softening(np.eye(k.size), k))
+
+    def transmission(self, k: Array) -> Array:
+        """Compute P = 1 − K_L B (k_m + Bᵀ K_L B)⁻¹ Bᵀ (C, C): K_eff = P K_L, also where k is 0.
+
+        P Δ are the changes of tension that are left of Δ (C,) once the motors have yielded.
+        """
+        B = self.matrix
+        return np.asarray(np.eye(k.size) - (k[:, None] * B) @ _inverse(self.of_motors(k)) @ B.T)
+
+    def yielded(self, slopes: Array, k: Array) -> Array:
+        """Compute B (k_m + Bᵀ K_L B)⁻¹ Bᵀ ∂F/∂θ (C, nv) [m/rad]: wire that the motors let out.
+
+        ``slopes`` ∂F/∂θ (C, nv) are those of rigid motors.
+        """
+        return np.asarray(self.matrix @ _inverse(self.of_motors(k)) @ (self.matrix.T @ slopes))
+
+    def settle(self, law: TensionLaw, torque: Array, start: Array) -> tuple[Array, Array, Array]:
+        """Find the turns φ (m,) [rad] at which Bᵀ F(B φ) = ``torque`` − k_m φ (m,) [N m].
+
+        It is the least of a convex energy, so Newton's method finds it if a step is shortened until
+        the energy does not rise again at its end. Returns φ, F and dF/dL (C,) there. Raises
+        CdsmError, which names the motor, if no turn gives its torque.
+        """
+        B = self.matrix
+        k_m = self.stiffness
+        turn = start
+        F, k = law(B @ turn)
+        before = math.inf
+        for _ in range(_STEPS):
+            off = B.T @ F + k_m * turn - torque
+            size = abs(B).T @ (abs(F) + _SHORT * k) + abs(k_m * turn) + abs(torque) + _smallest(B)
+            error = float((abs(off) / size).max())
+            if error <= _SETTLED or 0.5 * before <= error <= _STALLED:
+                return turn, F, k
+            before = error
+            stiff = np.where(k > 0.0, k, 1e-3 * k.max(initial=1.0))  # of slack cables, for the step
+            step = -_inverse(self.of_motors(stiff)) @ off
+            part = 1.0
+            there, slope = law(B @ (turn + step))
+            for _ in range(60):
+                rise = (B.T @ there + k_m * (turn + part * step) - torque) @ step
+                if rise <= -0.5 * (off @ step):
+                    break
+                part = part / 2.0
+                there, slope = law(B @ (turn + part * step))
+            turn = turn + part * step
+            F = there
+            k = slope
+        worst = int((abs(off) / size).argmax())
+        raise CdsmError(
+            f"motor {self.names[worst]!r}: no turn gives the torque of {torque[worst]:.4g} N m "
+            "that it holds: its cables are slack, and cables only pull.",
+            Status.NO_EQUILIBRIUM,
+        )
+
+    def turns_for(self, elongation: Array, k: Array, slack: NDArray[np.bool_]) -> Array:
+        """Compute the turns (m,) per motion that makes the cables longer by (C,), to first order.
+
+        Cables at 0 N, which ``slack`` (C,) marks, pull only where they become longer.
+        """
+        B = self.matrix
+        pulls = np.asarray(k > 0.0)
+        turn = np.zeros(self.stiffness.size)
+        for _ in range(_STEPS):
+            taut = np.where(pulls, k, 0.0)
+            turn = -_inverse(self.of_motors(taut)) @ (B.T @ (taut * elongation))
+            before = pulls
+            pulls = (k > 0.0) & np.where(slack, elongation + B @ turn > 0.0, True)
+            if (pulls == before).all():
+                break
+        return np.asarray(turn)
+
+    def extended(self, K: Array, magnitudes: Array, J: Array, k: Array) -> tuple[Array, ...]:
+        """Add the motors to the joints: K (…, n, n), its magnitudes and J_L (…, C, n) with n + m.
+
+        The stiffness of all cables is then diag k again, so that single ones may be taken out.
+        """
+        B = np.broadcast_to(self.matrix, (*J.shape[:-1], self.matrix.shape[1]))
+        pulled = (self.matrix.T * k[..., None, :]) @ J
+        rigid = K + self.softening(J, k)
+        motors = self.of_motors(k)
+        size = magnitudes + abs(rigid - K)
+        corner = pulled.swapaxes(-1, -2)
+        whole = np.concatenate(
+            [np.concatenate([rigid, corner], -1), np.concatenate([pulled, motors], -1)], -2
+        )
+        sizes = np.concatenate(
+            [np.concatenate([size, abs(corner)], -1), np.concatenate([abs(pulled), motors], -1)], -2
+        )
+        return whole, abs(sizes), np.concatenate([J, B], -1)
+
+
+def _smallest(B: Array) -> Array:
+    """Return the torque of each motor (m,) [N m] under the smallest tension that counts."""
+    return np.asarray(abs(B).sum(axis=0) * RANGES["tension"].low)
+
+
+def _inverse(A: Array) -> Array:
+    """Invert symmetric A (…, m, m) ≥ 0; where motors have no stiffness at all, it is 0."""
+    d = np.sqrt(np.diagonal(A, axis1=-2, axis2=-1))
+    scale = 1.0 / np.where(d > 0.0, d, 1.0)
+    both = scale[..., :, None] * scale[..., None, :]
+    return np.asarray(np.linalg.pinv(A * both, rcond=_REGULAR, hermitian=True) * both)
+
+
+class Motors(Printed):
+    """All motors of an arm: those that were given, then one for each cable that none of them moves.
+
+    The motor of a single cable has the cable's name, and takes in 1 m of wire per 1 m.
+
+    Attributes:
+        given: The motors that were given.
+        names: Names of all M motors.
+        matrix: B (C, M) [m/rad]: wire of each cable taken in per turn of each motor.
+    """
+
+    def __init__(self, given: tuple[Motor, ...], cables: Cables) -> None:
+        moved = {name for motor in given for name in motor.cables}
+        own = [name for name in cables.names if name not in moved]
+        radii: list[Mapping[str, float]] = [motor.cables for motor in given]
+        radii += [{name: 1.0} for name in own]
+        columns = [[row.get(name, 0.0) for name in cables.names] for row in radii]
+        self.given = given
+        self.names = (*(motor.name for motor in given), *own)
+        self.matrix = frozen(np.array(columns).T)
+        self._force = [cables[name].control == "force" for name in own]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Motors):
+            return NotImplemented
+        return self.given == other.given and self.names == other.names
+
+    def __hash__(self) -> int:
+        return hash(self.names)
+
+    @property
+    def are_free(self) -> bool:
+        """Whether there are as many motors as cables, so that they can give any tensions."""
+        return len(self) == len(self.matrix)
+
+    @cached_property
+    def yielding(self) -> Yielding | None:
+        """Those of the given motors that yield; None if all are rigid."""
+        soft = [i for i, motor in enumerate(self.given) if motor.yields]
+        if not soft:
+            return None
+        stiffness = [0.0 if self.holds_torque[i] else self.given[i].stiffness for i in soft]
+        names = tuple(self.names[i] for i in soft)
+        return Yielding(names, frozen(self.matrix[:, soft].copy()), frozen(np.array(stiffness)))
+
+    @cached_property
+    def holds_torque(self) -> tuple[bool, ...]:
+        """Whether each motor holds a torque (M,), or a cable's own one a tension."""
+        return (*(motor.control == "torque" for motor in self.given), *self._force)
+
+    @cached_property
+    def compliance(self) -> Array:
+        """B k_m⁻¹ Bᵀ (C, C) [m/N], which the motors add to the compliance of the cables.
+
+        It is ±inf between cables of a motor that holds its torque.
+        """
+        soft = self.yielding
+        if soft is None:
+            return frozen(np.zeros((len(self.matrix),) * 2))
+        held = soft.stiffness == 0.0
+        B = soft.matrix[:, ~held]
+        added = (B / soft.stiffness[~held]) @ B.T
+        for column in soft.matrix[:, held].T:
+            together = np.outer(column, column)
+            added = np.where(together == 0.0, added, np.copysign(np.inf, together))
+        return frozen(added)
+
+    @cached_property
+    def fixed(self) -> Array:
+        """N (C, C − M), orthonormal: Nᵀ B = 0. No motor changes Nᵀ l_0; assembly has set it."""
+        return frozen(np.linalg.svd(self.matrix)[0][:, len(self) :].copy())
+
+    def require_independent(self) -> None:
+        """Raise InvalidInput if turns of some motors undo each other in all cables."""
+        unit = self.matrix / np.linalg.norm(self.matrix, axis=0)
+        _, size, turns = np.linalg.svd(unit)
+        if len(self) <= len(self.matrix) and size.min() > _RANK:
+            return
+        together = np.flatnonzero(abs(turns[-1]) > 1e-6)
+        names = listed([self.names[i] for i in together])
+        raise InvalidInput(
+            "motors",
+            f"{names} do the same: turned together they move no cable. Leave one of them out, or "
+            "change its radii.",
+        )
+
+    @property
+    def count(self) -> str:
+        """How many there are for how many cables, in words."""
+        return f"{plural(len(self), 'motor')} for {plural(len(self.matrix), 'cable')}"
+
+    @property
+    def line(self) -> str:
+        """What prints say of the motors; empty if each cable has its own, which is rigid."""
+        if not self.given:
+            return ""
+        shown = [str(motor) for motor in self.given[:_SHOWN]]
+        more = len(self.given) - _SHOWN
+        shown += [f"and {more} more"] * (more > 0)
+        return f"{self.count}: {'; '.join(shown)}"
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the given motors for JSON by name: radii [m], stiffness [N m/rad], control."""
+        return {
+            motor.name: {
+                "cables_m_per_rad": dict(motor.cables),
+                "stiffness_Nm_per_rad": motor.stiffness,
+                "control": motor.control,
+            }
+            for motor in self.given
+        }
+
+    def __str__(self) -> str:
+        rows = [("motor", "cables", "holds")]
+        for motor in self.given:
+            radii = ", ".join(f"{cable} {1e3 * r:+.4g} mm" for cable, r in motor.cables.items())
+            rows.append((motor.name, radii, motor.holds))
+        own = self.names[len(self.given) :]
+        for name, force in zip(own, self._force, strict=True):
+            rows.append((name, "its own", "holds its tension" if force else "holds its length"))
+        return "\n".join([*aligned(rows), self.count])
+
+
+_SHOWN = 4  # most motors in a line
+
+
+def needs_assembly(motors: Motors) -> str:
+    """Return what a result says whose tensions the motors cannot reach from another posture."""
+    return (
+        f"needs its own assembly at this posture: {motors.count} cannot set each tension; "
+        "distribute_tension(pose, assembly=) keeps an assembly"
+    )
+
+
+YIELDING_REMEDY = (
+    "Leave stiffness and control of the motor out, or give the cable a series_stiffness instead."
+)
+
+
+def refuse_shared(motors: Motors, what: str, remedy: str = "") -> None:
+    """Raise InvalidInput if motors move several cables, so that tensions are not free.
+
+    ``what`` cannot work then; ``remedy`` is what works, where the user stands.
+    """
+    if not motors.are_free:
+        free = f"tensions of {len(motors.matrix)} cables are not free: "
+        works = remedy or (
+            "Use distribute_tension(pose, assembly=) or forward_statics(motors=, assembly=), "
+            "or, in Python, with_motors([]) for an arm with a motor for each cable."
+        )
+        raise InvalidInput(what, f"{free}{plural(len(motors), 'motor')} move them. {works}")
+
+
+def refuse_yielding(motors: Motors, what: str, why: str, remedy: str) -> None:
+    """Raise InvalidInput if a motor yields: ``why`` comes after its name."""
+    if motors.yielding is not None:
+        names = listed(motors.yielding.names)
+        raise InvalidInput(what, f"{names} {why}. {remedy}")
+
+
+def refuse_rough(motors: Motors, has_friction: bool, what: str) -> None:
+    """Raise InvalidInput if cables have friction in their holes, and a motor yields."""
+    if has_friction:
+        why = "yields: friction in the holes would couple all cables that it moves"
+        remedy = "Take friction 0, as by with_friction(0) or friction=False, or rigid motors: "
+        refuse_yielding(motors, what, why, f"{remedy}leave their stiffness and control out.")
