@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm import readings
 from cdsm.errors import CdsmError, InvalidInput
+from cdsm.loads import LoadsLike, loads_of
 from cdsm.motors import refuse_shared
 from cdsm.planning.tension_space import LARGEST_TENSION, form_by_tension, unstable
 from cdsm.posture import Posture
@@ -244,7 +245,7 @@ def saturation(
     direction: Direction,
     minimum: float = 0.0,
     maximum: ArrayLike = math.inf,
-    wrench: ArrayLike = NO_WRENCH,
+    wrench: LoadsLike = NO_WRENCH,
     *,
     fraction: float = 0.95,
 ) -> Saturation:
@@ -263,7 +264,7 @@ def saturation(
             becomes stable at a higher one, the curve begins there.
         maximum: Upper bound of the tensions [N], for all cables or (C,). Without it, and where no
             elasticity ends, the curve ends at 1000 times the largest of the least tensions.
-        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; or loads on links.
         fraction: Part of the largest stiffness, above 0, at most 1 [-].
 
     Raises:
@@ -286,13 +287,14 @@ def saturation(
     start = scalar("minimum", minimum)
     if not 0.0 < part <= 1.0:
         raise InvalidInput("fraction", f"{part:g} given; 0 < fraction <= 1 is needed.")
+    load = loads_of(arm, wrench)
     ceiling = bound("maximum", maximum, len(arm.cables))
 
     @cache
     def at(lower: float) -> Stiffness:
-        return stiffness(pose, distribute_tension(pose, lower, ceiling, wrench))
+        return stiffness(pose, distribute_tension(pose, lower, ceiling, load))
 
-    distribute_tension(pose, start, ceiling, wrench)  # raises if minimum exceeds maximum
+    distribute_tension(pose, start, ceiling, load)  # raises if minimum exceeds maximum
     laws = [cable.elasticity for cable in arm.cables if cable.control == "position"]
     low = max([start, *(law.low for law in laws)])
     at(low).require_mobile(u)

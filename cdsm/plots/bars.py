@@ -133,7 +133,7 @@ def plot_stiffness_range(
     arm = attainable.posture.arm
     panel, y = _rows(ax, arm.cables.names)
     low, high = attainable.low_tension.values, attainable.high_tension.values
-    panel.hlines(y, low, high, color="0.75", lw=1.0, zorder=1)
+    panel.hlines(y, low, high, color="0.75", lw=1.0, zorder=1, gid="between")
     panel.set_xlim(0.0, 1.08 * _marks(panel, y, attainable))
     panel.set_xlabel("tension [N]")
     direction = style.direction_name(attainable.direction)

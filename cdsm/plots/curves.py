@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
+from cdsm.applied import Applied, as_loads, tip_only
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.planning.sensitivity import Saturation, saturation
 from cdsm.plots import style
@@ -84,7 +85,7 @@ def plot_stiffness_over_tension(
     on more tension adds little.
 
     Args:
-        pose: The posture; or a saturation, which brings levels, direction and wrench.
+        pose: The posture; or a saturation, which brings levels, direction, upper bound and loads.
         levels: Lower bounds of the tensions (n,) [N]. Where the arm asks for more, the tension that
             held is drawn. None: 60 levels up to where the curve of :func:`~cdsm.saturation` ends.
         direction: An axis such as ``"z"``, or (3,) in base axes, any length.
@@ -104,12 +105,14 @@ def plot_stiffness_over_tension(
         >>> ax.get_xlabel(), ax.get_ylabel()
         ('least tension of all cables [N]', 'stiffness along z [N/mm]')
     """
-    wrench: Array = np.asarray(NO_WRENCH, dtype=float)
+    wrench: Applied = np.asarray(NO_WRENCH, dtype=float)
+    maximum: Array = np.array(math.inf)
     saturated = None
     if isinstance(pose, Saturation):
         saturated = pose
         u = saturated.direction
-        wrench = saturated.tension.wrench
+        wrench = saturated.tension.applied
+        maximum = saturated.tension.maximum
         pose = saturated.posture
     else:
         instance("pose", pose, Posture)
@@ -119,10 +122,11 @@ def plot_stiffness_over_tension(
     if levels is None:
         assert saturated is not None
         curve = saturated.minimum
-        least = float(distribute_tension(pose, curve[0], wrench=wrench).minimum_held.min())
+        first = distribute_tension(pose, curve[0], maximum, wrench)
+        least = float(first.minimum_held.min())
         levels = np.geomspace(max(least, curve[0], 1e-9 * curve[-1]), curve[-1], _LEVELS)
     bounds = np.sort(np.atleast_1d(number_array("levels", levels)))
-    x, along, parts = _over_tension(pose, bounds, u, wrench)
+    x, along, parts = _over_tension(pose, bounds[bounds <= maximum.min()], u, wrench, maximum)
     panel = style.panel(ax)
     panel.axhline(0.0, color="0.3", lw=0.6)
     name = style.direction_name(u)
@@ -149,7 +153,9 @@ def plot_stiffness_over_tension(
     style.name_lines(panel, float(x[last] if len(x) > 1 else panel.get_xlim()[1]), ends)
     panel.set(xlabel="least tension of all cables [N]", ylabel=f"stiffness along {name} [N/mm]")
     if np.isnan(along[last + 1 :]).any():
-        ends_here = _shade_unstable(panel, pose, wrench, float(x[last]))
+        bounded = bool(np.isfinite(maximum).any()) or bool(as_loads(wrench).on_links)
+        buckles = math.inf if bounded else critical_tension(pose, tip_only(wrench)).minimum
+        ends_here = _shade_unstable(panel, float(x[last]), buckles)
         question = f"does more tension make it stiffer? It {ends_here}"
     else:
         question = "does more tension make it stiffer?"
@@ -160,7 +166,7 @@ def plot_stiffness_over_tension(
 
 
 def _over_tension(
-    pose: Posture, bounds: Array, u: Array, wrench: Array
+    pose: Posture, bounds: Array, u: Array, wrench: Applied, maximum: Array
 ) -> tuple[Array, Array, dict[str, Array]]:
     """Return tensions that held [N], stiffness and its terms [N/mm]; NaN where it is unstable."""
     levels: list[float] = []
@@ -172,7 +178,7 @@ def _over_tension(
         row: dict[str, float] = {}
         value = math.nan
         try:
-            F = distribute_tension(pose, bound, wrench=wrench)
+            F = distribute_tension(pose, bound, maximum, wrench)
             held = float(F.minimum_held.min())
             K = stiffness(pose, F)
             if K.is_stable:
@@ -200,14 +206,16 @@ def _over_tension(
     return np.array(levels), np.array(along), terms
 
 
-def _shade_unstable(panel: Axes, pose: Posture, wrench: Array, stable: float) -> str:
-    """Hatch where the arm does not hold, above the last stable bound; return words for it."""
+def _shade_unstable(panel: Axes, stable: float, buckles: float) -> str:
+    """Hatch where the arm does not hold, above the last stable bound; return words for it.
+
+    ``buckles`` is the bound at which it buckles, inf if that is not known.
+    """
     end = float(panel.get_xlim()[1])
-    critical = critical_tension(pose, wrench)
     words = f"holds up to {stable:.3g} N"
     low = stable
-    if stable <= critical.minimum <= end:
-        low = critical.minimum
+    if stable <= buckles <= end:
+        low = buckles
         words = f"buckles from {low:.3g} N"
     place = panel.get_xaxis_transform()
     face = Rectangle((low, 0.0), end - low, 1.0, transform=place, fc=_UNSTABLE, ec="none")

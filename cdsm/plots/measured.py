@@ -114,12 +114,12 @@ def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: s
     for (name, low, high), shade in zip(stages, cycle(("0.93", "0.98", "0.88")), strict=False):
         middle = (low + high) / 2.0
         if along == "x":
-            axes.axvspan(low, high, color=shade, zorder=0, linewidth=0)
+            axes.axvspan(low, high, color=shade, zorder=0, linewidth=0, gid=f"stage:{name}")
             look["rotation"] = 90.0 if high - low < _BROAD * whole else 0.0
             where = axes.get_xaxis_transform()
             axes.text(middle, 0.98, name, transform=where, ha="center", va="top", **look)
         else:
-            axes.axhspan(low, high, color=shade, zorder=0, linewidth=0)
+            axes.axhspan(low, high, color=shade, zorder=0, linewidth=0, gid=f"stage:{name}")
             where = axes.get_yaxis_transform()
             axes.text(0.02, middle, name.replace("\n", " "), transform=where, va="center", **look)
 
@@ -152,7 +152,8 @@ def plot_identification(
             predicted = size * fit.predicted[places]
             ends = [np.append(measured, predicted).min(), np.append(measured, predicted).max()]
             panel.plot(ends, ends, color="0.6", linewidth=0.9)
-            panel.errorbar(measured, predicted, xerr=sigma, fmt="none", ecolor=style.BLUE)
+            bars = panel.errorbar(measured, predicted, xerr=sigma, fmt="none", ecolor=style.BLUE)
+            bars[2][0].set_gid(f"sigma:{unit}")
             panel.plot(measured, predicted, "o", color=style.BLUE, gid=f"predicted:{unit}")
             panel.set(xlabel=f"measured [{unit}], ± σ", ylabel=f"predicted [{unit}]")
     if loops:
@@ -160,7 +161,8 @@ def plot_identification(
         left[-1].legend(loc="best", ncols=1 + (len(loops) > 6))
     place = np.arange(len(rows))
     for width, shade in ((2.0, 0.12), (1.0, 0.2)):
-        right.axhspan(-width, width, color="0.5", alpha=shade, linewidth=0.0)
+        look: dict[str, Any] = {"color": "0.5", "alpha": shade, "linewidth": 0.0}
+        right.axhspan(-width, width, gid=f"within:{width:g}", **look)
     right.vlines(place, 0.0, fit.residuals, color=style.BLUE)
     size = 4 if len(rows) < 100 else 2
     right.plot(place, fit.residuals, "o", color=style.BLUE, markersize=size, gid="residuals")
@@ -209,7 +211,7 @@ def plot_experiment_plan(
     left.set_yticks(np.arange(half.size), plan.names)
     left.grid(visible=False, axis="y")
     left.invert_yaxis()
-    left.set_xlabel("95 % interval, ± % of the expected value")
+    left.set_xlabel("95 % interval, ± [% of the expected value]")
     counts = right.bar(np.arange(plan.counts.size), plan.counts, color=style.VERMILLION)
     for k, bar in enumerate(counts):
         bar.set_gid(f"tests:{k}")

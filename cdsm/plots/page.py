@@ -208,11 +208,14 @@ def _curve(K: Stiffness, tension: Tension, u: Array) -> str:
 def draw_curve(K: Stiffness, tension: Tension, u: Array) -> Axes:
     """Plot the stiffness over the least tension, with a mark where this one is, if stable."""
     here = float(tension.minimum_held.min())
-    saturated = saturation(K.posture, u, wrench=K.wrench)
+    saturated = saturation(K.posture, u, maximum=tension.maximum, wrench=K.applied)
     low = float(saturated.minimum[0])
     high = min(float(saturated.minimum[-1]), _REACH * here or 2.0 * saturated.bound)
     high = max(high, _BEYOND * here)  # also where the arm no longer holds
-    levels = np.geomspace(max(low, 1e-9 * high), high, _CURVE_LEVELS) if high > low else None
+    high = min(high, float(tension.maximum_held.min()))
+    levels = None
+    if high > low:  # with one at the mark, which may be the last that holds
+        levels = np.append(here, np.geomspace(max(low, 1e-9 * high), high, _CURVE_LEVELS))
     panel = plot_stiffness_over_tension(saturated, levels, title="")
     return _mark(panel, here, N_PER_MM * K.along(u)) if K.is_stable else panel
 
@@ -261,8 +264,13 @@ def _python(K: Stiffness) -> str:
     """Return lines of Python that compute the stiffness again."""
     pose = K.posture
     wrench = f", wrench={K.tip_wrench.tolist()}" if K.tip_wrench.any() else ""
-    if as_loads(K.applied).on_links:
-        wrench = ", wrench=loads"  # those of the notes, at any point of a link
+    loads = ""
+    if on_links := as_loads(K.applied).on_links:
+        each = [(load.at.link, load.wrench, load.at.local) for load in on_links]
+        each += [(pose.arm.tip_link, K.tip_wrench, np.zeros(3))] * bool(K.tip_wrench.any())
+        lines = ",\n".join(f"    {_load(*load)}" for load in each)
+        loads = f"loads = [\n{lines},\n]\n"
+        wrench = ", wrench=loads"
     pull = f"{K.tension.tolist()}{wrench}"
     if (tension := K.distribution) is not None and tension.least:
         low = _bound(tension.minimum)
@@ -272,10 +280,17 @@ def _python(K: Stiffness) -> str:
     return (
         "import cdsm\n\n"
         'arm = cdsm.Manipulator.read("ARM.toml")\n'
-        f"pose = arm.at({pose.q.tolist()})\n"
+        f"pose = arm.at({pose.q.tolist()})\n{loads}"
         f"K = cdsm.stiffness(pose, {pull})\n"
         'K.report().write("REPORT.html")'
     )
+
+
+def _load(link: str, wrench: Array, point: Array) -> str:
+    """Return a load on a link as Python."""
+    force, moment, place = (tuple(row) for row in np.array([*np.split(wrench, 2), point]).tolist())
+    turned = f", moment={moment}" if any(moment) else ""
+    return f"cdsm.Load({link!r}, force={force}{turned}, point={place})"
 
 
 def _bound(bound: Array) -> str:

@@ -168,7 +168,8 @@ def plot_tracking_run(
         style.from_zero(stiffness, target, achieved)
     half = MM * run.band
     if np.isfinite(half).any():
-        band.fill_between(t, -half, half, color=style.SKY, alpha=0.4, label="first-order band")
+        look: dict[str, Any] = {"color": style.SKY, "alpha": 0.4, "gid": "band"}
+        band.fill_between(t, -half, half, label="first-order band", **look)
     moved = MM * run.displacement
     band.plot(t, moved, color=style.VERMILLION, label="tip", gid="displacement")
     band.set(ylabel="displacement from\nfrictionless\nequilibrium [mm]")

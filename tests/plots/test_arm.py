@@ -1,5 +1,6 @@
 """Pictures of arms: what is drawn stands where it is, on ordinary axes."""
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,11 @@ import cdsm
 from cdsm import plots
 from cdsm.planning.path_plan import PathPlan
 from cdsm.plots.projection import projection
-from cdsm.plots.style import TENSION_COLORS
+from cdsm.plots.style import TENSION_COLORS, VERMILLION
+from tests.core.test_posture import ring
 from tests.support.arms import mixed_arm, random_posture
-from tests.support.pictures import artists, line, require_look
+from tests.support.pictures import artists, line, named, require_look, words
+from tests.support.printed import numbers, require_all
 from tests.support.sweeps import short_arm
 
 POSE = random_posture(mixed_arm(), 3)
@@ -61,10 +64,68 @@ def test_cables_stand_where_they_are_coloured_by_tension_and_nearer_ones_in_fron
     assert np.ptp(layers) > 0.01
     for k, bone in enumerate(POSE.bones):
         np.testing.assert_allclose(line(ax, f"bone:{k}"), 1e3 * bone[:, [0, 2]])
-    assert len(artists(ax, "disk:")) == len(POSE.arm.geometry.disks)
+    for disk in POSE.arm.geometry.disks:
+        edge = artists(ax, f"disk:{disk.index}")[f"disk:{disk.index}"].get_xy()
+        turn = np.linspace(0.0, 2.0 * np.pi, 73)
+        ring = disk.radius * np.array([np.cos(turn), np.sin(turn)])
+        placement = POSE.link_pose(disk.link)
+        rim = placement[:3, 3] + np.c_[0.0 * turn + disk.x, ring.T] @ placement[:3, :3].T
+        np.testing.assert_allclose(np.ptp(edge, axis=0), 1e3 * np.ptp(rim[:, [0, 2]], axis=0))
+        np.testing.assert_allclose(edge.min(axis=0), 1e3 * rim[:, [0, 2]].min(axis=0))
     np.testing.assert_allclose(line(ax, "tip"), 1e3 * POSE.tip[None, [0, 2], 3])
     assert ax.get_aspect() == 1.0
     require_look(ax)
+
+
+def test_base_axes_are_drawn_to_the_scale_that_they_name() -> None:
+    ax = plots.plot_arm(POSE, view=(90.0, -90.0))
+    (length,) = numbers(words(ax), "axes {}")
+    assert length.unit == "mm"
+    for name, direction in zip("xy", np.eye(2), strict=True):
+        arrow = artists(ax, f"axis:{name}")[f"axis:{name}"]
+        moved = np.subtract(arrow.xy, arrow.xyann)
+        np.testing.assert_allclose(moved, float(length.text) * direction, atol=1e-9)
+        np.testing.assert_allclose(named(ax)[name].xy, arrow.xy)
+    np.testing.assert_allclose(named(ax)["z"].xy, artists(ax, "axis:x")["axis:x"].xyann)
+
+
+def test_names_stand_at_the_ends_of_their_cables_and_colours_at_their_tensions() -> None:
+    ax = plots.plot_arm(POSE, PULL, view=FRONT, names=True)
+    for name, path in zip(POSE.arm.cables.names, POSE.cable_paths, strict=True):
+        np.testing.assert_allclose(named(ax)[name].xy, 1e3 * path[-1, [0, 2]])
+    (bar,) = (child for child in ax.child_axes if child.get_title(loc="left") == "N")
+    np.testing.assert_allclose(bar.get_ylim(), [PULL.values.min(), PULL.values.max()])
+
+
+def test_links_that_overlap_are_red_and_others_are_not() -> None:
+    closed = ring(50.0)
+    ax = plots.plot_arm(closed)
+    touching = {link for pair in closed.self_contacts for link in pair}
+    assert touching
+    for disk in closed.arm.geometry.disks:
+        color = artists(ax, f"disk:{disk.index}")[f"disk:{disk.index}"].get_edgecolor()
+        red = np.allclose(color, to_rgba(VERMILLION))
+        assert red == (disk.link in touching)
+
+
+def test_a_robot_has_its_joints_and_pulleys_as_they_touch() -> None:
+    finger = cdsm.Manipulator.read("examples/finger_with_pulleys.toml")
+    pose = finger.at(np.deg2rad([0.0, 70.0, 40.0, 20.0]))
+    ax = plots.plot_arm(pose, view=FRONT)
+    touches = [bool(touch) for touch in pose.wrapping.touches]
+    assert {*touches} == {True, False}
+    for k, (rim, touch) in enumerate(zip(pose.wrapping.rims, touches, strict=True)):
+        drawn = artists(ax, f"pulley:{k}")[f"pulley:{k}"]
+        np.testing.assert_allclose(drawn.get_xydata(), 1e3 * rim[:, [0, 2]])
+        assert drawn.get_linestyle() == ("-" if touch else "--")
+    slides = np.asarray(finger.slides)
+    for kind, chosen, marker in (("turns", ~slides, "o"), ("slides", slides, "s")):
+        if chosen.any():
+            drawn = artists(ax, f"joints:{kind}")[f"joints:{kind}"]
+            assert drawn.get_marker() == marker
+            np.testing.assert_allclose(
+                drawn.get_xydata(), 1e3 * pose.joint_positions[chosen][:, [0, 2]]
+            )
 
 
 def test_no_force_moves_the_tip_beyond_the_outline_and_some_reach_it() -> None:
@@ -78,9 +139,10 @@ def test_no_force_moves_the_tip_beyond_the_outline_and_some_reach_it() -> None:
     for turn in np.linspace(0.0, 2.0 * np.pi, 17):
         n = np.array([np.cos(turn), np.sin(turn)])
         assert (moved @ n).max() == pytest.approx((edge @ n).max(), rel=1e-2)
-    words = [text.get_text() for text in ax.texts]
-    longest = 1e3 * np.linalg.norm(K.compliance[:3, :3], 2)
-    assert f"1 N moves it by up to {longest:.2g} mm, drawn × 50" in words
+    moves = numbers(words(ax), "{} moves it by up to {}, drawn × {}")
+    require_all(
+        zip(moves, (1.0, np.linalg.norm(K.compliance[:3, :3], 2), 50.0), strict=True), digits=2
+    )
 
 
 def test_load_is_an_arrow_along_the_force() -> None:
@@ -99,6 +161,7 @@ def test_slack_cables_are_dashed_and_an_unstable_arm_is_called_so() -> None:
     lines = artists(plots.plot_arm(POSE, values), "cable:")
     dashed = {gid.split(":")[1] for gid, path in lines.items() if path.get_linestyle() != "-"}
     assert dashed == {POSE.arm.cables.names[3]}
+    assert f"dashed: 1 of {len(values)} cables are slack" in words(plots.plot_arm(POSE, values))
     loose = short_arm(spring=1500.0, lead=0.5).at(np.zeros(6))
     buckled = cdsm.stiffness(loose, cdsm.distribute_tension(loose, 100.0))
     assert not buckled.is_stable
@@ -131,6 +194,8 @@ def test_arms_beside_each_other_have_one_scale() -> None:
         color = artists(ax, "cable:")[f"cable:{name}:0"].get_color()
         np.testing.assert_allclose(to_rgba(color), TENSION_COLORS(share), atol=1e-9)
     assert (first.get_title(loc="left"), second.get_title(loc="left")) == ("a", "b")
+    scales = [numbers(words([ax]), "drawn × {}")[0].text for ax in (first, second)]
+    assert scales[0] == scales[1]
     require_look([first, second])
 
 
@@ -162,16 +227,40 @@ def test_path_has_the_way_of_the_tip_and_a_film(plan: PathPlan, tmp_path: Path) 
     require_look(ax)
     with Image.open(tmp_path / "arm.gif") as film:
         assert film.n_frames == 3  # type: ignore[attr-defined]
+    low, high = plan.tensions.min(), plan.tensions.max()
+    name = plan.arm.cables.names[0]
+    shade = TENSION_COLORS((plan.tensions[-1, 0] - low) / (high - low))
+    color = artists(ax, f"cable:{name}:0")[f"cable:{name}:0"].get_color()
+    np.testing.assert_allclose(to_rgba(color), shade, atol=1e-9)
+
+
+def test_the_arm_of_a_film_moves(tmp_path: Path) -> None:
+    poses = [POSE.arm.at(share * POSE.q) for share in (-1.0, 0.0, 1.0)]
+    plots.plot_path(poses, view=FRONT, animate=tmp_path / "arm.gif")
+    with Image.open(tmp_path / "arm.gif") as film:
+        frames = []
+        for k in range(3):
+            film.seek(k)
+            frames.append(np.asarray(film.convert("L"), dtype=float)[60:])  # below the title
+    grey = [abs(frame - 204.0) < 3.0 for frame in frames]  # the links
+    moved = [np.mean(one != other) / np.mean(one) for one, other in pairwise(grey)]
+    assert min(moved) > 0.5
 
 
 def test_modes_are_drawn_in_their_shapes() -> None:
     modes = cdsm.modes(K)
     ax = modes.plot(view=FRONT)
-    name = f"{modes.frequencies[0]:.3g} Hz"
-    tip = line(ax, f"mode:{name}:{len(POSE.bones) - 1}")[-1] / 1e3 - POSE.tip[[0, 2], 3]
-    wanted = (POSE.jacobian[:3] @ modes.shapes[:, 0])[[0, 2]]
-    assert tip @ wanted > 0.9 * np.linalg.norm(tip) * np.linalg.norm(wanted)
-    assert name in [text.get_text() for text in ax.get_legend().get_texts()]
+    legend = ax.get_legend()
+    keys = zip(legend.get_lines(), legend.get_texts(), strict=True)
+    colors = {text.get_text(): key.get_color() for key, text in keys}
+    assert len(colors) == 3
+    for frequency, shape in zip(modes.frequencies, modes.shapes.T[:3], strict=False):
+        name = f"{frequency:.3g} Hz"
+        gid = f"mode:{name}:{len(POSE.bones) - 1}"
+        tip = line(ax, gid)[-1] / 1e3 - POSE.tip[[0, 2], 3]
+        wanted = (POSE.jacobian[:3] @ shape)[[0, 2]]
+        assert tip @ wanted > 0.7 * np.linalg.norm(tip) * np.linalg.norm(wanted)
+        assert artists(ax, gid)[gid].get_color() == colors[name]
     require_look(ax)
 
 
@@ -184,6 +273,9 @@ def test_forces_within_the_outline_are_those_that_cables_balance() -> None:
     np.testing.assert_allclose(outline.min(axis=0), corners.min(axis=0))
     worst = polytope.radius * polytope.worst_direction[[0, 2]]
     np.testing.assert_allclose(line(ax, "worst"), [[0.0, 0.0], worst], atol=1e-12)
+    require_all([(numbers(words(ax), "red: {} in the worst direction")[0], polytope.radius)])
+    (length,) = numbers(words(ax), "axes {}")
+    assert length.unit == "N"
     require_look(ax)
 
 

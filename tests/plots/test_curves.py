@@ -5,12 +5,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex, to_rgba
 
 import cdsm
 from cdsm import plots
-from cdsm.plots.style import move_apart, round_numbers
+from cdsm.plots.curves import _MARKS
+from cdsm.plots.style import DARK, TERM_COLORS, VERMILLION, move_apart, round_numbers
 from tests.support.arms import mixed_arm, random_posture
-from tests.support.pictures import artists, line, require_look
+from tests.support.pictures import artists, colors_of, line, named, require_look, words
+from tests.support.printed import numbers, require_all
 from tests.support.sweeps import short_arm
 
 SHAPE = np.deg2rad([10.0, 5.0, 10.0, 5.0, -8.0, 0.0, -8.0, 0.0])
@@ -46,6 +49,13 @@ def test_curve_over_tension_is_the_stiffness_and_the_sum_of_its_terms(direction:
     shares = K80.shares(direction)
     assert terms["term:passive"][-1] == pytest.approx(1e-3 * shares.passive.sum())
     assert terms["term:active"][-1] == pytest.approx(1e-3 * shares.active.sum())
+    for gid in terms:  # each has its name at its end, in its colour
+        name = gid.partition(":")[2]
+        drawn, written = colors_of(ax, gid)
+        assert written in (drawn, to_rgba(DARK.get(to_hex(drawn), to_hex(drawn))))
+        ends = [y for _, y in sorted((named(ax)[n.partition(":")[2]].xy[1], n) for n in terms)]
+        assert ends == sorted(terms, key=lambda n: terms[n][-1])
+        assert drawn == to_rgba(TERM_COLORS[name])
     assert ax.get_xlabel() == "least tension of all cables [N]"
     assert ax.get_ylabel() == f"stiffness along {direction} [N/mm]"
     require_look(ax)
@@ -64,6 +74,8 @@ def test_saturation_and_buckling_are_marked_where_they_are() -> None:
     saturated = cdsm.saturation(bent, "z")
     ax = saturated.plot()
     assert line(ax, "saturation")[0, 0] == pytest.approx(saturated.bound)
+    marked = numbers(words(ax), "{} of the most from {}")
+    require_all(zip(marked, (saturated.fraction, saturated.bound), strict=True), digits=3)
     require_look(ax)
     soft = short_arm(spring=1500.0, lead=0.5).at(np.zeros(6))
     critical = cdsm.critical_tension(soft)
@@ -77,6 +89,13 @@ def test_saturation_and_buckling_are_marked_where_they_are() -> None:
     ax = critical.plot()
     np.testing.assert_allclose(line(ax, "margin").T, [critical.bounds, critical.margins])
     assert line(ax, "event:buckling")[0, 0] == critical.minimum
+    require_all([(numbers(words(ax), "it buckles from {}")[0], critical.minimum)])
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (
+        "least tension of all cables [N]", "smallest joint stiffness [N m/rad]"
+    )  # fmt: skip
+    (span,) = artists(ax, "unstable").values()
+    assert span.get_x() == pytest.approx(critical.minimum)
+    assert span.get_x() + span.get_width() == pytest.approx(critical.examined[1])
     require_look(ax)
 
 
@@ -87,6 +106,8 @@ def test_curve_of_a_sweep_has_a_scale_for_each_direction() -> None:
         values = dataset.along.sel(direction=u).values.ravel()
         np.testing.assert_allclose(line(ax, f"curve:{u}"), np.c_[[10, 20, 40], 1e-3 * values])
         assert ax.get_ylim()[1] < 1.5e-3 * values.max()
+        assert ax.get_xlabel() == "least tension of all cables [N]"
+        assert ax.get_ylabel() == f"stiffness along {u} [N/mm]"
     require_look(axs)
 
 
@@ -103,6 +124,10 @@ def test_weight_goes_up_with_the_displacement_and_events_stand_at_their_loads(
     assert moved[-1] > 0.0
     slope = np.diff(line(ax, "linear"), axis=0)[0]
     assert slope[1] / slope[0] == pytest.approx(1e-3 * test.tangent)
+    require_all([(numbers(words(ax), "linear: {}")[0], test.tangent)], digits=3)
+    require_all([(numbers(words(ax), "how far does {} move")[0], 12.0)])
+    assert ax.get_xlabel() == "displacement of the tip along −z [mm]"
+    assert ax.get_ylabel() == "weight [N]"
     slack = [event for event in test.events if event.kind == "slack"]
     assert slack
     curve = line(ax, "curve")
@@ -116,8 +141,36 @@ def test_weight_goes_up_with_the_displacement_and_events_stand_at_their_loads(
         assert x == pytest.approx(-1e3 * exact.displacement[2], rel=1e-9)
         before = cdsm.weight_test(slender, tension, [0.0, 0.0, 0.01 - event.load], steps=2)
         assert before.tensions[-1][slender.arm.cables.names.index(event.place)] > 0.0
+        mark = artists(ax, f"event:{event}")[f"event:{event}"]
+        assert mark.get_marker() == "o"
     assert f"{slack[0]}" in [text.get_text() for text in ax.texts]
     require_look(ax)
+
+
+def test_kinds_of_events_are_told_apart_and_names_have_one_colour() -> None:
+    markers, colors = zip(*_MARKS.values(), strict=True)
+    assert len({*markers}) == len({*colors}) == len(_MARKS)
+    assert _MARKS["buckling"] == ("X", VERMILLION)  # what ends the curve is red
+    bars = K.shares("z").plot()
+    legend = {text.get_text(): key for text, key in zip(
+        bars.get_legend().get_texts(), bars.get_legend().get_patches(), strict=True)}  # fmt: skip
+    soft = short_arm(spring=1500.0, lead=0.5).at(np.zeros(6))
+    curve = plots.plot_stiffness_over_tension(soft, [2.0, 5.0, 10.0])
+    for name in ("passive", "active"):
+        (key,) = (key for text, key in legend.items() if text.startswith(name))
+        assert to_rgba(key.get_facecolor()) == colors_of(curve, f"term:{name}")[0]
+
+
+def test_weight_with_friction_is_drawn_beside_that_without() -> None:
+    rough = POSE.arm.with_friction(0.1).at(POSE.q)
+    tension = cdsm.distribute_tension(rough, 20.0)
+    test = cdsm.weight_test(rough, tension, [0.0, 0.0, -1.0], steps=3)
+    ax = test.plot()
+    start = test.unloaded.pose.tip[2, 3]
+    smooth = [0.0, *(1e3 * (start - state.pose.tip[2, 3]) for state in test.states)]
+    drawn = line(ax, "frictionless")
+    np.testing.assert_allclose(drawn, np.c_[smooth, [0.0, *test.loads]], atol=1e-12)
+    assert (drawn[1:, 0] > line(ax, "test")[1:, 0]).all()  # friction holds it back
 
 
 @pytest.fixture(scope="module")
@@ -140,11 +193,25 @@ def test_area_of_the_loop_is_the_work_lost(history: Any) -> None:
     area = abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2.0  # mJ
     lost = 1e3 * history.dissipated[-24:].sum()
     assert area == pytest.approx(lost, rel=0.1)  # straight between the loads
-    assert f"{lost:.3g} mJ lost per cycle" in [text.get_text() for text in ax.texts]
+    require_all([(numbers(words(ax), "{} lost per cycle")[0], 1e-3 * lost)], digits=3)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("displacement along z [mm]", "force [N]")
     slips = [line(ax, gid)[0] for gid in artists(ax, "event:holes slide")]
     first = int(np.flatnonzero((history.sliding != 0).any(axis=1))[0])
     np.testing.assert_allclose(slips, [[moved[first + 1], force[first + 1]]])
     require_look(ax)
+
+
+def test_moments_alone_show_where_the_tip_goes(history: Any) -> None:
+    pose = history.reference
+    turned = cdsm.load_cycle(
+        pose, history.reference_tension, np.outer([0.1, 0.2, 0.0], np.eye(6)[4])
+    )
+    ax = turned.plot()
+    for k, axis in enumerate("xyz"):
+        number, moved = line(ax, f"tip:{axis}").T
+        np.testing.assert_allclose(number, [-1, 0, 1, 2])
+        np.testing.assert_allclose(moved, [0.0, *1e3 * turned.displacement[:, k]], atol=1e-15)
+    assert ax.get_ylabel() == "displacement [mm]"
 
 
 def test_bars_of_shares_add_up_to_the_stiffness() -> None:
@@ -159,7 +226,14 @@ def test_bars_of_shares_add_up_to_the_stiffness() -> None:
     assert names[:count] == list(POSE.arm.cables.names)
     assert ax.get_ylim()[0] > ax.get_ylim()[1]  # first on top
     percents = [text.get_text() for text in ax.texts][:count]
-    assert percents == [f"{100.0 * shares[name] / shares.total:z.1f} %" for name in names[:count]]
+    parts = (shares.passive + shares.active) / shares.total
+    assert percents == [f"{100.0 * part:z.1f} %" for part in parts]
+    (total,) = numbers(ax.get_xlabel(), "to {} along z")
+    require_all([(total, K.along("z"))])
+    assert ax.get_xlabel().startswith("contribution [N/mm]")
+    rest = dict(zip(shares.others, widths[2 * count :], strict=True))
+    for name, value in rest.items():
+        assert value == pytest.approx(1e-3 * shares.others[name])
     require_look(ax)
 
 
@@ -171,7 +245,15 @@ def test_bars_of_tensions_are_tensions_between_their_bounds() -> None:
     first = PULL.values[0]
     assert texts[0] == f"{first:.1f} N, {first / 5.0:.0f} %"
     np.testing.assert_allclose(line(ax, "bound:minimum")[:, 0], 10.0)
+    names = [text.get_text() for text in ax.get_yticklabels()]
+    assert names == [*PULL]
+    centres = [bar.get_y() + bar.get_height() / 2.0 for bar in artists(ax, "tension:").values()]
+    np.testing.assert_allclose(ax.get_yticks(), centres)
     require_look(ax)
+    most = 1.05 * PULL.values.max()
+    capped = cdsm.distribute_tension(POSE, 10.0, most).plot()
+    np.testing.assert_allclose(line(capped, "bound:maximum")[:, 0], most)
+    np.testing.assert_allclose(line(capped, "bound:minimum")[:, 0], 10.0)
     with pytest.raises(cdsm.InvalidInput, match="breaking: -5 N given"):
         PULL.plot(breaking=-5.0)
 
@@ -182,12 +264,16 @@ def test_plans_stand_between_the_softest_and_the_stiffest_arm() -> None:
     for ax in (plan.plot(reach), reach.plot()):
         np.testing.assert_allclose(line(ax, "softest")[:, 0], reach.low_tension.values)
         np.testing.assert_allclose(line(ax, "stiffest")[:, 0], reach.high_tension.values)
-        words = [text.get_text() for text in ax.get_legend().get_texts()]
-        assert words == [
-            f"softest: {1e-3 * reach.low:.4g} N/mm",
-            f"stiffest: {1e-3 * reach.high:.4g} N/mm",
-        ]
+        for name, value in (("softest", reach.low), ("stiffest", reach.high)):
+            require_all([(numbers(words(ax), f"{name}: {{}}")[0], value)])
+        assert ax.get_xlabel() == "tension [N]"
         require_look(ax)
+    between = artists(reach.plot(), "between")["between"].get_segments()
+    ends = [segment[:, 0] for segment in between]
+    np.testing.assert_allclose(ends, np.c_[reach.low_tension.values, reach.high_tension.values])
+    require_all([(numbers(words(plan.plot()), "which tensions give {}")[0], plan.achieved)])
+    missed = replace(plan, target=2.0 * np.asarray(plan.target))
+    require_all([(numbers(words(missed.plot()), "missed by {}")[0], missed.misfit)], digits=2)
     bars = artists(plan.plot(), "tension:").values()
     np.testing.assert_allclose([bar.get_width() for bar in bars], plan.tension.values)
     other = cdsm.stiffness_range(POSE, "x", 10.0, 200.0)
@@ -196,11 +282,22 @@ def test_plans_stand_between_the_softest_and_the_stiffest_arm() -> None:
 
 
 def test_critical_load_is_marked_at_its_factor() -> None:
-    critical = cdsm.critical_load(POSE, np.eye(6)[0], 10.0)
+    ax = cdsm.critical_load(POSE, np.eye(6)[0], 10.0).plot()
+    assert "how much of the load does it hold? All" in words(ax)
+    assert ax.get_xlabel() == "factor of the load, 1 N along x"
+    soft = short_arm(spring=1500.0, lead=0.5).at(np.zeros(6))
+    critical = cdsm.critical_load(soft, [-2.0, 0.0, 0.0, 0.0, 0.0, 0.0], 5.0)
     ax = critical.plot()
     np.testing.assert_allclose(line(ax, "margin").T, [critical.factors, critical.margins])
-    if np.isfinite(critical.factor):
-        assert line(ax, "event:end")[0, 0] == critical.factor
+    assert line(ax, "event:end")[0, 0] == critical.factor
+    ends = {"buckling": "buckles", "infeasible": "no balance", "elasticity": "end of a law"}
+    factor = numbers(words(ax), f"{ends[critical.limit]} at {{}} times the load")
+    require_all([(factor[0], critical.factor)])
+    assert ax.get_xlabel() == "factor of the load, 2 N along −x"
+    assert ax.get_ylabel() == "smallest joint stiffness [N m/rad]"
+    capped = cdsm.critical_load(soft, [0.0, 0.0, -1.0, 0.0, 0.0, 0.0], 5.0, 12.0)
+    assert capped.limit == "infeasible"
+    assert f"no balance at {capped.factor:.4g} times" in words(capped.plot())
     require_look(ax)
 
 

@@ -12,7 +12,8 @@ import cdsm
 from cdsm import plots
 from cdsm.plots import maps
 from cdsm.plots.maps import Cells
-from tests.support.pictures import artists, line, require_look
+from tests.support.pictures import artists, line, named, require_look, words
+from tests.support.printed import numbers
 from tests.support.sweeps import short_arm
 
 BENDS = np.deg2rad([-20.0, -5.0, 5.0, 15.0])
@@ -44,6 +45,12 @@ def test_cells_of_two_joints_have_their_value_at_their_angles(planar: xr.Dataset
         np.testing.assert_allclose(x, [-27.5, 20.0])  # half a step beyond the angles
         np.testing.assert_allclose(y, [-15.0, 15.0])
         assert (ax.get_xlabel(), ax.get_ylabel()) == ("joint1_1 [°]", "joint3_1 [°]")
+        marks = np.quantile(values[~np.isnan(values)], (0.1, 0.5, 0.9), method="inverted_cdf")
+        shown = numbers(words([ax]), "10/50/90 %: {} / {} / {}")
+        assert [mark.text for mark in shown] == [f"{mark:.3g}" for mark in marks]
+    status = planar.sel(minimum=5.0).status.values
+    (part,) = numbers(words(axs), "{} hold")
+    assert float(part.text) == pytest.approx(100.0 * np.isin(status, [0, 7]).mean(), abs=0.06)
     norms = [artists(ax, "cells")["cells"].norm for ax in axs]
     assert norms[0].vmax > 3.0 * norms[1].vmax  # a scale for each direction
     figure = axs[0].figure
@@ -59,6 +66,10 @@ def test_unstable_cells_are_hatched_and_cases_share_a_scale(planar: xr.Dataset) 
     assert not artists(axs[0], "fault:")
     (hatched,) = artists(axs[2], "fault:").items()
     assert hatched[0] == "fault:unstable"
+    legend = {key.get_text() for legend in axs[0].figure.legends for key in legend.get_texts()}
+    assert legend == {"unstable"}
+    for ax, low in zip(axs, (5, 40, 100), strict=True):
+        assert f"tensions from {low} N" in words([ax])
     assert len(hatched[1].get_paths()) == 12
     assert np.isnan(cells(axs[2])).all()
     margins = plots.plot_map(planar, "margin")
@@ -111,10 +122,19 @@ def test_a_cloud_is_shown_in_slices_and_a_section_has_its_tips_alone() -> None:
     dataset = cdsm.sweep(arm, cdsm.RandomPoses(256), minimum=20.0, maximum=400.0, progress=False)
     axs = plots.plot_map(dataset)
     assert len(axs) == 3
+    tips = 1e3 * dataset.tip_position.values
+    for ax, normal in zip(axs, (1, 2, 0), strict=True):
+        middle, half = numbers(words([ax]), f"{'xyz'[normal]} = {{}} ± {{}} mm")
+        assert float(middle.text) == pytest.approx(np.median(tips[:, normal]), abs=0.06)
+        assert float(half.text) == pytest.approx(0.04 * np.ptp(tips[:, normal]), rel=0.06)
+        plane = [axis for axis in "xyz" if axis != "xyz"[normal]]
+        assert [ax.get_xlabel(), ax.get_ylabel()] == [f"{axis} [mm]" for axis in plane]
+        inside = abs(tips[:, normal] - np.median(tips[:, normal])) <= 0.04 * np.ptp(tips[:, normal])
+        held = np.isfinite(dataset.softest.values[inside]).sum()
+        assert f"{held} of {inside.sum()} postures hold" in words([ax])
     assert any("no balance" in gid for ax in axs for gid in artists(ax, "fault:"))
     (ax,) = plots.plot_map(dataset, section=("y", 0.01, 0.02))
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [mm]", "z [mm]")
-    tips = 1e3 * dataset.tip_position.values
     inside = abs(tips[:, 1] - 10.0) <= 20.0
     values = 1e-3 * dataset.softest.values[inside]
     binned = cells(ax)
@@ -133,9 +153,14 @@ def test_a_path_is_a_curve_over_the_way() -> None:
     way = cdsm.PathPoses([np.zeros(6), np.full(6, 0.1)], 5)
     dataset = cdsm.sweep(arm, way, minimum=[10.0, 20.0], progress=False)
     (ax,) = plots.plot_map(dataset)
-    x, y = line(ax, "line:tensions from 20 N").T
-    np.testing.assert_allclose(x, np.rad2deg(dataset.distance.values))
-    np.testing.assert_allclose(y, 1e-3 * dataset.softest.sel(minimum=20.0).values)
+    for low in (10, 20):
+        name = f"tensions from {low} N"
+        x, y = line(ax, f"line:{name}").T
+        np.testing.assert_allclose(x, np.rad2deg(dataset.distance.values))
+        np.testing.assert_allclose(y, 1e-3 * dataset.softest.sel(minimum=low).values)
+        assert named(ax)[name].xy[1] == pytest.approx(y[-1])
+    assert ax.get_xlabel() == "way along the path [°]"
+    assert " ".join(ax.get_ylabel().split()) == "stiffness in the softest direction [N/mm]"
     require_look(ax)
 
 

@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import pkgutil
+from dataclasses import replace
 from typing import Any
 
 import matplotlib
@@ -11,12 +12,15 @@ import pytest
 from matplotlib.figure import Figure
 
 import cdsm
-from cdsm import paper, plots, track
+from cdsm import plots, track
 from cdsm.identification import Identification, WeightLoop, identify
 from cdsm.planning.path_plan import PathPlan
 from cdsm.support.values import Plotted
+from tests.design import test_problem as designs
+from tests.identification import test_experiment as experiment
 from tests.identification import test_search as identified
-from tests.support.pictures import artists, line, panels, require_look
+from tests.support.pictures import artists, line, require_look, words
+from tests.support.printed import numbers, require_all
 from tests.support.sweeps import short_arm
 from tests.support.tracking import small_path
 
@@ -27,8 +31,11 @@ def test_wanted_and_reached_stiffness_of_a_plan_are_positive_and_tensions_its_ow
     plan: PathPlan = small_path(0.0)
     axs = plan.plot()
     above, below = axs
-    np.testing.assert_allclose(line(above, "wanted:z")[:, 1], 1e-3 * plan.target)
-    np.testing.assert_allclose(line(above, "reached:z")[:, 1], 1e-3 * plan.achieved)
+    np.testing.assert_allclose(line(above, "wanted:z"), np.c_[[0, 1, 2], 1e-3 * plan.target])
+    np.testing.assert_allclose(line(above, "reached:z"), np.c_[[0, 1, 2], 1e-3 * plan.achieved])
+    assert (above.get_ylabel(), below.get_xlabel()) == ("stiffness [N/mm]", "sample")
+    assert below.get_ylabel() == "tension of each cable [N]"
+    assert "Every sample is" in words(axs)
     for name, values in zip(plan.arm.cables.names, plan.tensions.T, strict=True):
         np.testing.assert_allclose(line(below, f"tension:{name}"), np.c_[[0, 1, 2], values])
     require_look(axs)
@@ -39,6 +46,7 @@ def test_infeasible_samples_are_hatched() -> None:
     axs = plan.plot()
     bad = {sample.index for sample in plan.infeasible}
     assert bad == {2}
+    assert "hatched: 1 of 3 samples infeasible" in words(axs).replace("Hatched", "hatched")
     for ax in axs:
         (span,) = artists(ax, "infeasible").values()
         assert span.get_x() == pytest.approx(1.5)
@@ -53,9 +61,22 @@ def test_tracking_run_is_drawn_over_time() -> None:
     np.testing.assert_allclose(line(stiffness, "wanted:z")[:, 1], 1e-3 * run.target[:, 0])
     np.testing.assert_allclose(line(stiffness, "reached:z")[:, 1], 1e-3 * run.stiffness[:, 0])
     np.testing.assert_allclose(line(band, "displacement")[:, 1], 1e3 * run.displacement)
+    edge = artists(band, "band")["band"].get_paths()[0].vertices[:, 1]
+    half = 1e3 * run.band[np.isfinite(run.band)].max()
+    np.testing.assert_allclose([edge.min(), edge.max()], [-half, half])
     name = run.plan.arm.cables.names[0]
     np.testing.assert_allclose(line(tension, f"tension:{name}")[:, 1], run.tension[:, 0])
+    assert [ax.get_ylabel().split("[")[-1] for ax in axs] == ["mm]", "N/mm]", "mm]", "N]"]
+    assert tension.get_xlabel() == "time [s]"
+    assert f"what does the law {run.law} hold?" in words(axs)
     require_look(axs)
+
+
+def test_the_time_at_which_the_load_changes_is_dotted() -> None:
+    run = track(small_path(0.0), steps=2, minimum=10.0, maximum=250.0, payload=0.05)
+    first = run.time[1:][(np.diff(run.wrench, axis=0) != 0.0).any(axis=1)][0]
+    for ax in run.plot():
+        np.testing.assert_allclose(line(ax, "load changes")[:, 0], first)
 
 
 def test_ranges_of_directions_are_drawn_around() -> None:
@@ -66,6 +87,10 @@ def test_ranges_of_directions_are_drawn_around() -> None:
     np.testing.assert_allclose(turn[:2], [0.0, np.pi / 2.0], atol=1e-12)
     np.testing.assert_allclose(radius[:2], [1e-3 * r.high for r in ranges])
     np.testing.assert_allclose(line(ax, "softest")[:2, 1], [1e-3 * r.low for r in ranges])
+    ends = [text.get_text() for text in ax.get_xticklabels()]
+    assert ends == ["+y", "+z", "−y", "−z"]
+    np.testing.assert_allclose(np.rad2deg(ax.get_xticks()), [0.0, 90.0, 180.0, 270.0])
+    assert "[N/mm]" in words(ax)
     with pytest.raises(cdsm.InvalidInput, match="ax: is not polar"):
         plots.plot_stiffness_ranges({"a": ranges}, ax=Figure().subplots())
 
@@ -79,6 +104,16 @@ def test_fit_of_a_tensile_test_is_drawn_over_it() -> None:
     np.testing.assert_allclose(force, fit.test.force)
     assert np.interp(240.0, *line(left, "fit").T[::-1]) == pytest.approx(0.5, rel=0.05)
     np.testing.assert_allclose(line(right, "rigidity").T, [fit.tension, 1e-3 * fit.rigidity])
+    edge = artists(right, "band")["band"].get_paths()[0].vertices[:, 1]
+    ends = 1e-3 * fit.band.low.min(), 1e-3 * fit.band.high.max()
+    np.testing.assert_allclose([edge.min(), edge.max()], ends)
+    for stage in fit.stages:
+        span = artists(right, f"stage:{stage.name}")[f"stage:{stage.name}"]
+        assert span.get_x() == pytest.approx(stage.low)
+        assert span.get_x() + span.get_width() == pytest.approx(stage.high)
+    assert (left.get_xlabel(), left.get_ylabel()) == ("strain [%]", "force [N]")
+    assert (right.get_xlabel(), right.get_ylabel()) == ("tension [N]", "tangent rigidity EA [kN]")
+    require_all([(numbers(words(axs), "wire of {}")[0], fit.test.gauge_length)])
     require_look(axs)
 
 
@@ -87,6 +122,7 @@ def test_law_of_a_wire_is_drawn_in_kilonewtons() -> None:
     F, EA = line(ax, "tangent").T
     np.testing.assert_allclose(EA, 1e-3 * np.asarray(STRAND.rigidity(F)))
     np.testing.assert_allclose(line(ax, "secant")[:, 1], 1e-3 * STRAND.secant_rigidity(F))
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("tension [N]", "rigidity EA [kN]")
     require_look(ax)
 
 
@@ -95,7 +131,16 @@ def test_identified_stiffness_is_predicted_over_measured() -> None:
     axs = fit.plot()
     points = line(axs[0], "predicted:N/mm")
     np.testing.assert_allclose(points, 1e-3 * np.c_[fit.measured, fit.predicted])
+    assert (axs[0].get_xlabel(), axs[0].get_ylabel()) == (
+        "measured [N/mm], ± σ", "predicted [N/mm]"
+    )  # fmt: skip
+    bars = artists(axs[0], "sigma:N/mm")["sigma:N/mm"].get_segments()
+    half = [np.ptp(segment[:, 0]) / 2.0 for segment in bars]
+    np.testing.assert_allclose(half, [1e-3 * measurement.std for measurement in fit.measurements])
     np.testing.assert_allclose(line(axs[-1], "residuals")[:, 1], fit.residuals)
+    for width in (1, 2):
+        span = artists(axs[-1], f"within:{width}")[f"within:{width}"]
+        np.testing.assert_allclose([span.get_y(), span.get_height()], [-width, 2 * width])
     require_look(axs)
 
 
@@ -152,6 +197,9 @@ def test_bars_of_a_budget_are_its_sources(budget: Any) -> None:
     assert labels == [*bars]
     assert whole == pytest.approx(budget.standard_uncertainty / size)
     assert ax.get_xlabel() == f"standard uncertainty [{unit}]"
+    require_all([(numbers(words(ax), "= {}: what makes it uncertain")[0], budget.value)])
+    written = [float(text.get_text()) for text in ax.texts]
+    np.testing.assert_allclose(written, [bar.get_width() for bar in bars.values()], rtol=6e-3)
     require_look(ax)
 
 
@@ -164,15 +212,62 @@ def test_intervals_of_monte_carlo_stand_where_they_are(budget: Any) -> None:
             float(mark.get_xdata()[0]) for mark in ax.lines if mark.get_gid() == f"interval:{name}"
         ]
         np.testing.assert_allclose(ends, np.array(interval) / size)
+    x, y = line(ax, "first order").T
+    assert np.trapezoid(y, x) == pytest.approx(1.0, abs=0.01)
+    assert x[y.argmax()] == pytest.approx(budget.value / size, rel=1e-2)
+    (histogram,) = artists(ax, "histogram").values()
+    corners = histogram.get_xy()
+    area = np.sum(
+        corners[:-1, 0] * np.diff(corners[:, 1]) - corners[:-1, 1] * np.diff(corners[:, 0])
+    )
+    assert abs(area) / 2.0 == pytest.approx(1.0, abs=0.01)
+    middle = (corners[:, 0].min() + corners[:, 0].max()) / 2.0
+    assert middle == pytest.approx(budget.value / size, rel=0.1)
     require_look(ax)
 
 
-@pytest.mark.parametrize("name", ["fig3", "fig5", "fig8"])
-def test_figures_of_the_paper_are_drawn(name: str) -> None:
-    picture = paper.FIGURES[name]().plot()
-    for ax in panels(picture):
-        if ax.axison:
-            assert ax.lines
+def test_planned_tests_have_their_counts_and_intervals() -> None:
+    plan = experiment.PLAN
+    left, right = axs = plan.plot()
+    half = 1.96 * plan.std / abs(plan.values)
+    for name, part in zip(plan.names, half, strict=True):
+        bar = artists(left, f"interval:{name}")[f"interval:{name}"]
+        assert bar.get_width() == pytest.approx(100.0 * part)
+    assert [label.get_text() for label in left.get_yticklabels()] == [*plan.names]
+    heights = [bar.get_height() for bar in artists(right, "tests:").values()]
+    assert heights == plan.counts.tolist()
+    assert left.get_xlabel() == "95 % interval, ± [% of the expected value]"
+    assert f"{plan.counts.sum()} tests chosen" in words(axs)
+    require_look(axs)
+
+
+def test_designs_have_their_objectives_and_the_compromise_a_ring() -> None:
+    search = cdsm.search_designs(designs.problem(), generations=2, population=8, seed=1)
+    objectives = search.problem.objectives
+    axs = search.plot()
+    values = [search.best[each.key] / each.unit[1] for each in objectives]
+    labels = [" ".join(label.split()) for label in search.objective_labels]
+    for ax, k in zip(axs, range(1, len(objectives)), strict=True):
+        np.testing.assert_allclose(line(ax, "front"), np.c_[values[0], values[k]])
+        ring = [values[0][search.compromise], values[k][search.compromise]]
+        np.testing.assert_allclose(line(ax, "compromise"), [ring])
+        shown = [" ".join(text.split()) for text in (ax.get_xlabel(), ax.get_ylabel())]
+        assert shown == [labels[0], labels[k]]
+    assert f"which of {len(search.evaluated)} designs" in words(axs)
+    require_look(axs)
+
+
+def test_search_for_one_objective_gets_better() -> None:
+    task = replace(designs.problem(), objectives=designs.problem().objectives[:1])
+    search = cdsm.search_designs(task, generations=3, population=8, seed=1)
+    (ax,) = search.plot()
+    (objective,) = task.objectives
+    count, best = line(ax, "best").T
+    values = search.evaluated[objective.key] / objective.unit[1]
+    better = np.max if objective.sign < 0 else np.min
+    for k, value in zip(count.astype(int), best, strict=True):
+        feasible = search.evaluated.feasible[:k]
+        assert value == pytest.approx(better(values[:k][feasible]))
 
 
 def test_settings_of_matplotlib_stay_as_they_are(budget: Any) -> None:

@@ -1,18 +1,22 @@
 """The page of a report: it says what the text says, and loads and runs nothing."""
 
+import html
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import cdsm
+from cdsm.plots import page
 from cdsm.plots.page import draw_curve
 from cdsm.stiffness_matrix import Report
 from tests.support import arms, locked
 from tests.support.pictures import artists
+from tests.support.printed import Printed, numbers, require_all
 
 HOSTILE = '<script src="http://evil">$\\frac{$&\' onload=x'
 NUMBER = re.compile(r"\d[\d.]*(?:e[+-]?\d+)?")
@@ -130,6 +134,19 @@ def test_the_mark_in_the_curve_is_the_stiffness_of_the_report() -> None:
     assert np.interp(x, *lines["along"].get_data()) == pytest.approx(y, rel=1e-3)
 
 
+@pytest.mark.parametrize("times", [1.0, 0.98])
+def test_the_mark_is_on_the_curve_also_where_a_maximum_binds(times: float) -> None:
+    geometry = arms.readme_geometry(joints=3, cables_per_joint=5)
+    pose = cdsm.Manipulator(geometry, cdsm.LinearElasticity(48e3)).at(np.full(6, 0.1))
+    most = times * float(cdsm.distribute_tension(pose, 15.0).values.max())
+    tension = cdsm.distribute_tension(pose, 15.0, most)
+    assert tension.at_maximum or times == 1.0
+    K = cdsm.stiffness(pose, tension)
+    lines = artists(draw_curve(K, tension, np.array([0.0, 0.0, 1.0])), "")
+    (x,), (y,) = lines["here"].get_data()
+    assert np.interp(x, *lines["along"].get_data()) == pytest.approx(y, rel=1e-3)
+
+
 def test_the_curve_of_an_arm_that_buckles_shows_where_it_would_hold() -> None:
     K = REPORTS["FAIL"].stiffness
     assert K.distribution is not None
@@ -145,19 +162,90 @@ def test_loads_on_links_are_in_the_page() -> None:
     text = Reader(K.report().to_html()).text
     assert "load on link2" in text
     assert "-1.5) N" in text
-    assert "wrench=loads" in text
 
 
-def test_a_report_is_written_as_page_text_or_numbers(tmp_path: Path) -> None:
-    report = REPORTS["NOT CHECKED"]
-    text = report.write(tmp_path / "report.txt", "ARM.toml").read_text("utf-8")
-    assert text.splitlines() == [
-        *str(report).splitlines()[:1],
-        "ARM.toml",
-        *str(report).splitlines()[1:],
+@pytest.mark.parametrize("maximum", [np.inf, 30.0])
+@pytest.mark.parametrize("tip", [None, (0.0, 0.1, -0.5)])
+def test_lines_of_python_compute_the_same_stiffness(
+    maximum: float, tip: tuple[float, ...] | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also with loads on links, at any point, and bounds that some cables reach."""
+    monkeypatch.chdir(tmp_path)
+    pose = arms.prototype(cdsm.LinearElasticity(48e3), 15.0)[0]
+    pose.arm.write("ARM.toml")
+    hung = [
+        cdsm.Load("link2", force=(0.0, 0.0, -1.5)),
+        cdsm.Load("link4", force=(0.3, 0.0, 0.0), moment=(0.0, 0.01, 0.0), point=(0.01, 0.0, 0.02)),
+        *([cdsm.Load("tool0", force=tip)] if tip else []),
     ]
-    written = report.write(tmp_path / "report.html", "ARM.toml", "z").read_text("utf-8")
-    assert written == report.to_html("ARM.toml", "z")
-    assert "imbalance" in report.write(tmp_path / "report.csv").read_text("utf-8")
-    with pytest.raises(cdsm.InvalidInput, match=r"must end in \.html, \.txt, \.csv or \.nc"):
-        report.write(tmp_path / "report.pdf")
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 15.0, 2.0 * maximum, wrench=hung))
+    shown = K.report().to_html()
+    lines = html.unescape(re.search("<pre>(.*?)</pre>", shown, re.DOTALL)[1])  # type: ignore[index]
+    names: dict[str, Any] = {}
+    exec(lines, names)
+    np.testing.assert_allclose(names["K"].tension, K.tension, rtol=1e-12)
+    np.testing.assert_allclose(names["K"].joint, K.joint, rtol=1e-9)
+    assert Path("REPORT.html").exists()
+    assert 'id="curve-here"' in shown
+
+
+def test_numbers_of_the_page_are_those_of_the_stiffness() -> None:
+    K = REPORTS["PASS"].stiffness
+    text = Reader(REPORTS["PASS"].to_html()).text
+    rows = re.findall(r"moves [xyz]\s+(\S+)\s+(\S+)\s+(\S+)", text)
+    for shown, moved in zip(rows, K.compliance[:3, :3], strict=True):
+        require_all(zip([Printed(x, "mm") for x in shown], moved, strict=True))
+    axes, moves, _ = np.linalg.svd(K.compliance[:3, :3])
+    softest = numbers(text, "The tip is softest with {} along ({}, {}, {})")
+    require_all([(softest[0], 1.0 / moves[0])], digits=3)
+    direction = axes[:, 0] * np.sign(axes[abs(axes[:, 0]).argmax(), 0])
+    require_all(zip(softest[1:], direction, strict=True), digits=3)
+    pull = numbers(text, "cables pull {} to {}", "N")
+    require_all(zip(pull, (K.tension.min(), K.tension.max()), strict=True), digits=3)
+    place = numbers(text, "tip at ({}, {}, {}) mm", "mm")
+    require_all(zip(place, K.posture.tip[:3, 3], strict=True))
+    u = min("xyz", key=K.along)
+    assert f"Which cables make it stiff along {u}?" in text
+    assert K.distribution is not None
+    budget = cdsm.uncertainty(K.posture, K.distribution, K.posture.arm.tolerances, direction=u)
+    ends = numbers(text, "95 % of such arms: {} to {}", "N/mm")
+    require_all(zip(ends, budget.interval(), strict=True))
+    agree = [comparison.verdict for comparison in REPORTS["NOT CHECKED"].comparisons]
+    assert {*agree} != {"agrees"}
+    checks = f"Checks: {agree.count('agrees')} of {len(agree)} comparisons agree"
+    assert checks in REPORTS["NOT CHECKED"].to_html()
+
+
+@pytest.mark.parametrize("name", REPORTS)
+def test_the_pill_has_the_colour_of_the_outcome(name: str) -> None:
+    outcome = REPORTS[name].outcome
+    kind = {"PASS": "pass", "FAIL": "fail", "NOT CHECKED": "not-checked"}[outcome]
+    assert f'<span class="pill {kind}">{outcome}</span>' in REPORTS[name].to_html()
+
+
+def test_the_pictures_of_the_page_are_those_of_its_stiffness(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drawn: dict[str, Any] = {}
+
+    def record(name: str, draw: Any) -> Any:
+        def recorded(first: Any, *rest: Any, **options: Any) -> Any:
+            drawn[name] = (first, *rest)
+            return draw(first, *rest, **options)
+
+        return recorded
+
+    for name in ("plot_arm", "plot_shares", "plot_tensions", "plot_uncertainty"):
+        monkeypatch.setattr(page, name, record(name, getattr(page, name)))
+    report = REPORTS["PASS"]
+    K = report.stiffness
+    report.to_html()
+    u = np.eye(3)["xyz".index(min("xyz", key=K.along))]
+    np.testing.assert_array_equal(drawn["plot_shares"][0].direction, u)
+    assert drawn["plot_shares"][0].total == pytest.approx(K.along(u))
+    pose, tension, stiffness = drawn["plot_arm"]
+    assert pose is K.posture
+    assert stiffness is K
+    np.testing.assert_array_equal(tension, K.tension)
+    assert drawn["plot_tensions"][0] is K.distribution
+    assert drawn["plot_uncertainty"][0].value == pytest.approx(K.along(u))

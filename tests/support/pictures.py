@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -30,6 +31,27 @@ def artists(ax: Axes, start: str) -> dict[str, Any]:
 def line(ax: Axes, gid: str) -> Array:
     """The points (n, 2) of the line with this gid."""
     return np.asarray(artists(ax, gid)[gid].get_xydata(), dtype=float)
+
+
+def words(picture: Any) -> str:
+    """All texts of the panels of a picture, and of its figure, a line each; − is -."""
+    figure = figure_of(picture)
+    inside = [text for ax in panels(picture) for text in ax.findobj(Text)]
+    every = dict.fromkeys([*(text for text in figure.texts), *inside])
+    heading = figure._suptitle.get_text() if figure._suptitle is not None else ""
+    lines = [heading, *(text.get_text() for text in every if isinstance(text, Text))]
+    return "\n".join(" ".join(line.split()) for line in lines if line.strip())
+
+
+def named(ax: Axes) -> dict[str, Any]:
+    """The annotations of a panel by their text."""
+    return {text.get_text(): text for text in ax.texts}
+
+
+def colors_of(ax: Axes, gid: str) -> tuple[Any, Any]:
+    """The colour of the line with this gid, and of its name beside it, as they are drawn."""
+    name = gid.rpartition(":")[2]
+    return to_rgba(artists(ax, gid)[gid].get_color()), to_rgba(named(ax)[name].get_color())
 
 
 def texts(figure: Figure) -> list[Text]:
