@@ -57,6 +57,21 @@ class Chains:
     laws: CableLaws
     paths: ChainPaths | None = None
 
+    @property
+    def segment_names(self) -> tuple[str, ...]:
+        """Name of each segment (S,): its cable, and its number from the actuator."""
+        pairs = zip(self.segments, self.cable.tolist(), strict=True)
+        first = self.start.tolist()
+        return tuple(
+            f"{cable.name} segment {s - first[c] + 1}" for s, (cable, c) in enumerate(pairs)
+        )
+
+    @property
+    def hole_names(self) -> tuple[str, ...]:
+        """Name of each hole (P,): its cable, and the number of the site from the actuator."""
+        pairs = zip(self.hole.tolist(), self.site.tolist(), strict=True)
+        return tuple(f"{self.segments[s].name} site {site + 1}" for s, site in pairs)
+
     @classmethod
     def of(cls, cables: Sequence[Cable], body: RigidBody) -> Self:
         """Divide cables at their holes into segments."""

@@ -261,7 +261,7 @@ class StiffnessLoop:
             moved = wanted.angles + (estimate.pose.q - before.angles)
             # no arm is beyond its limits: there the estimate is wrong, and the limit is nearest
             pose = self._arm.at(np.clip(moved, self._arm.lower, self._arm.upper))
-            wrench = np.append(estimate.force, np.zeros(3))
+            wrench = np.append(estimate.tip_force.force, np.zeros(3))
             F, reached = self._least(pose, target, self._low * ratio, self._high * ratio, wrench)
             part = 1.0 / max(float((abs(F - last) / self._change).max()), 1.0)
             self._mean = last + part * (F - last)

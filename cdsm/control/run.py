@@ -14,7 +14,7 @@ from cdsm.errors import listed
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path_plan import PathPlan
 from cdsm.status import Status
-from cdsm.support.format import aligned, plural
+from cdsm.support.format import aligned, coordinates, plural
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.values import Array, Plotted, frozen
 
@@ -67,6 +67,8 @@ class TrackingRun(Result, Plotted):
             direction (n,) [m].
         wrench: Load (n, 6): force [N], then moment [N m].
         estimated_force: Force at the tip that the controller estimated (n, 3) [N].
+        estimated_force_band: Most by which friction can change each of its components (n, 3) [N],
+            as of :func:`~cdsm.estimate_load`.
         rigidity: Estimated rigidity of the wires, divided by the rigidity of their laws (n,) [-].
         target_unreachable: Whether the outer loop found no tensions within the bounds that give the
             target (n,).
@@ -108,6 +110,7 @@ class TrackingRun(Result, Plotted):
     displacement: Array = field(metadata=unit("m", "time"))
     wrench: Array = field(metadata=unit("N and N m", "time", "component"))
     estimated_force: Array = field(metadata=unit("N", "time", "axis"))
+    estimated_force_band: Array = field(metadata=unit("N", "time", "axis"))
     rigidity: Array = field(metadata=unit("1", "time"))
     target_unreachable: NDArray[np.bool_] = field(metadata=unit("1", "time"))
     change_limited: NDArray[np.bool_] = field(metadata=unit("1", "time"))
@@ -192,6 +195,14 @@ class TrackingRun(Result, Plotted):
         """Return a table over time, which ``cdsm view`` plays; needs pandas (CdsmError)."""
         return super().to_pandas().rename(columns=lambda name: name.removeprefix("angles "))
 
+    def _last_force(self) -> str:
+        """Return the last estimate of the force at the tip as text."""
+        if not len(self.time):
+            return "unknown"
+        band = self.estimated_force_band[-1]
+        friction = f" ± {coordinates(band, '.2g')} by friction" if band.any() else ""
+        return f"{coordinates(self.estimated_force[-1], '.3g')} N{friction}"
+
     def __repr__(self) -> str:
         return f"<TrackingRun of {self.arm.name}, law {self.law}, {self.outcome.word}>"
 
@@ -213,6 +224,7 @@ class TrackingRun(Result, Plotted):
             ("smallest joint stiffness", least),
             ("motors clamped at a tension bound", motors),
             ("rigidity of the wires, as estimated", f"{100.0 * self.rigidity[-1:].sum():.4g} %"),
+            ("force at the tip, as estimated", self._last_force()),
             (
                 "inside the first-order band",
                 f"{100.0 * inside.mean():.4g} % of {bands}" if inside.size else "no step has one",

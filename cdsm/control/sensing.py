@@ -23,13 +23,13 @@ from typing import Final, NamedTuple, final
 import numpy as np
 
 from cdsm.errors import InvalidInput
+from cdsm.estimation.balanced_loads import Instruments
+from cdsm.estimation.estimate import TipForce, tip_force
 from cdsm.friction.capstan import ChainProblem
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.support.validation import checked_quantity, scalar, whole_number
+from cdsm.support.validation import SMALLEST, checked_quantity, scalar, whole_number
 from cdsm.support.values import Array
-from cdsm.tension import friction_exponents
-from cdsm.terms import torque_of
 
 _LARGEST_NOISE: Final = 4.0  # standard deviations at which noise is cut off
 _UNSURE: Final = 0.3  # standard deviation of 1/s before the first measurement
@@ -113,7 +113,7 @@ class Estimate(NamedTuple):
 
     pose: Posture  # of the controller's arm, within its joint limits
     ratio: Array  # mean tension along each cable divided by that at the motor (C,) [-]
-    force: Array  # force at the tip (3,) [N], base axes
+    tip_force: TipForce  # force at the tip, base axes, and how well it is known
     softness: float  # 1/s: strain divided by that of the law [-]
     variance: float  # variance of ``softness`` [-]
     rest_length: Array  # of the wire in each segment (S,) [m]; it depends on all past sliding
@@ -138,7 +138,7 @@ class Observer:
         rest_length = self._problem.rest_lengths(pose.segments.lengths, T)
         one = np.ones(len(self.arm.cables))
         shares = np.ones(cable.size)
-        force = self._tip_force(pose, T)
+        force = self._tip_force(pose, T, np.zeros(pose.q.size))
         return Estimate(pose, one, force, 1.0, _UNSURE**2, rest_length, shares)
 
     def update(self, before: Estimate, measured: MotorMeasurement) -> Estimate:
@@ -173,11 +173,14 @@ class Observer:
                 break
         covariance = np.linalg.pinv(scaled)
         pose = self.arm.at(np.clip(q, self.arm.lower, self.arm.upper))
-        return self._after_sliding(before, pose, F)._replace(
+        angle_std = np.linalg.norm(covariance[:-1], axis=1)
+        return self._after_sliding(before, pose, F, angle_std)._replace(
             softness=x, variance=float(covariance[-1] @ covariance[-1])
         )
 
-    def _after_sliding(self, before: Estimate, pose: Posture, F: Array) -> Estimate:
+    def _after_sliding(
+        self, before: Estimate, pose: Posture, F: Array, angle_std: Array
+    ) -> Estimate:
         """Return the estimate after wire has slid through holes; ``F`` (C,) [N] at the motors."""
         segments = pose.segments
         chains = segments.chains
@@ -187,25 +190,22 @@ class Observer:
         # in a slack cable all tensions are 0: their ratio is taken as even
         shares = np.divide(chain.tension, motor, out=np.ones_like(motor), where=motor > 0.0)
         ratio = np.add.reduceat(shares * segments.lengths, chains.start[:-1]) / pose.cable_lengths
-        force = self._tip_force(pose, chain.tension)
+        force = self._tip_force(pose, chain.tension, angle_std)
         return before._replace(
-            pose=pose, ratio=ratio, force=force, rest_length=chain.rest_length, shares=shares
+            pose=pose, ratio=ratio, tip_force=force, rest_length=chain.rest_length, shares=shares
         )
 
-    def _tip_force(self, pose: Posture, tension: Array) -> Array:
-        """Compute the force f (3,) [N] at the tip that best balances the tensions T (S,) [N].
-
-        f solves J_vᵀ f = Σ_j T_j g_j + g by weighted least squares, with the gradient g_j of the
-        length of segment j. What is out of balance counts as an error of the tensions at the
-        motors, relative to the errors of load cells and friction.
-        """
-        segments = pose.segments
-        F = tension[segments.chains.start[:-1]]
-        spread = np.hypot(max(self._tension_spread, _LEAST_SPREAD), friction_exponents(pose) * F)
-        weights = np.linalg.pinv(pose.length_jacobian.T * spread)
-        torque = tension @ segments.length_jacobian + torque_of(pose.arm.terms, pose)
-        solution = np.linalg.lstsq(weights @ pose.jacobian[:3].T, weights @ torque, rcond=None)
-        return np.asarray(solution[0])
+    def _tip_force(self, pose: Posture, tension: Array, angle_std: Array) -> TipForce:
+        """Estimate the force at the tip from the followed tensions T (S,) [N] of the segments."""
+        chains = pose.segments.chains
+        F = tension[chains.start[:-1]]
+        before = tension[chains.hole]
+        ratio = np.divide(
+            tension[chains.hole + 1], before, out=np.ones(before.size), where=before > 0.0
+        )
+        exponents = np.log(np.maximum(ratio, SMALLEST))
+        spread = np.full(F.size, max(self._tension_spread, _LEAST_SPREAD))
+        return tip_force(pose, F, exponents, Instruments(spread, angle_std))
 
     def _mean_strain(self, pose: Posture, shares: Array, F: Array) -> Array:
         """Compute the mean strains ε̄ (C,) [-] from F (C,) [N] at the motors and shares ρ (S,)."""

@@ -21,6 +21,7 @@ from cdsm.plots.curves import plot_critical_tension as plot_critical_tension
 from cdsm.plots.curves import plot_load_history as plot_load_history
 from cdsm.plots.curves import plot_stiffness_over_tension, plot_tension_curve
 from cdsm.plots.curves import plot_weight_test as plot_weight_test
+from cdsm.plots.loads import plot_load_estimate as plot_load_estimate
 from cdsm.plots.maps import plot_map
 from cdsm.plots.measured import plot_designs as plot_designs
 from cdsm.plots.measured import plot_elasticity as plot_elasticity

@@ -61,7 +61,7 @@ def plot_shares(shares: Shares, ax: Axes | None = None, *, title: str | None = N
     direction = style.direction_name(shares.direction)
     panel.set_xlabel(f"contribution [N/mm] to {total:.4g} N/mm along {direction}")
     # to the left, where names of cables leave room
-    panel.legend(loc="upper right", bbox_to_anchor=(1.0, -0.42 / _height(panel)), ncols=2)
+    panel.legend(loc="upper right", bbox_to_anchor=(1.0, -0.42 / style.height_of(panel)), ncols=2)
     unstable = "" if shares.is_stable else "UNSTABLE: "
     style.set_title(panel, title, f"{unstable}{arm.name}: what makes it stiff?")
     return panel
@@ -164,11 +164,6 @@ def _shortened(name: str) -> str:
     return name if len(name) <= _LONGEST else f"{name[: half - 1]}…{name[-half:]}"
 
 
-def _height(panel: Axes) -> float:
-    """Return about how high a panel is [inch]."""
-    return style.figure_of(panel).get_figheight() * panel.get_position().height
-
-
 def _write(panel: Axes, x: float, y: float, text: str, color: str = style.INK) -> None:
     look: dict[str, Any] = {"fontsize": style.NOTE_SIZE, "va": "center", "color": color}
     panel.text(x, y, text, **look)
@@ -210,7 +205,7 @@ def _bounds(panel: Axes, y: Array, tension: Tension) -> None:
             look: dict[str, Any] = {"color": style.VERMILLION, "ms": 6, "mew": 1.1, "zorder": 3}
             panel.plot(bound[shown], y[shown], "|", label=words, gid=f"bound:{name}", **look)
     if panel.get_legend_handles_labels()[1]:
-        anchor = (0.0, -0.42 / _height(panel))
+        anchor = (0.0, -0.42 / style.height_of(panel))
         panel.legend(loc="upper left", bbox_to_anchor=anchor, ncols=2)
 
 
@@ -224,6 +219,6 @@ def _marks(panel: Axes, y: Array, attainable: StiffnessRange) -> float:
         look: dict[str, Any] = {"color": color, "mfc": "white", "mew": 1.0, "ms": 4.5, "zorder": 4}
         words = f"{name}: {N_PER_MM * value:.4g} N/mm"
         panel.plot(tension.values, y, marker, ls="", label=words, gid=name, **look)
-    anchor = (0.0, -0.42 / _height(panel))
+    anchor = (0.0, -0.42 / style.height_of(panel))
     panel.legend(loc="upper left", bbox_to_anchor=anchor, ncols=2)
     return float(max(attainable.low_tension.values.max(), attainable.high_tension.values.max()))

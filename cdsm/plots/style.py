@@ -149,6 +149,11 @@ def figure_of(panels: Axes | Panels) -> Figure:
     return figure
 
 
+def height_of(ax: Axes) -> float:
+    """Return about how high axes are [inch]."""
+    return figure_of(ax).get_figheight() * ax.get_position().height
+
+
 def panel(ax: Axes | None, height: float = 2.4, width: float = ONE_COLUMN) -> Axes:
     """Return ``ax`` in this style, or else the only axes of a new figure [inch].
 

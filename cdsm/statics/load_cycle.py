@@ -125,18 +125,12 @@ class LoadHistory(Result, Plotted):
     @property
     def holes(self) -> tuple[str, ...]:
         """Name of each hole (P,): its cable, and the number of the site from the actuator."""
-        chains = self.reference.segments.chains
-        names = self.reference.arm.cables.names
-        pairs = zip(chains.cable[chains.hole], chains.site, strict=True)
-        return tuple(f"{names[c]} site {site + 1}" for c, site in pairs)
+        return self.reference.segments.chains.hole_names
 
     @property
     def segment_names(self) -> tuple[str, ...]:
         """Name of each segment (S,): its cable, and its number from the actuator."""
-        chains = self.reference.segments.chains
-        names = self.reference.arm.cables.names
-        pairs = zip(chains.cable, np.arange(chains.cable.size), strict=True)
-        return tuple(f"{names[c]} segment {s - chains.start[c] + 1}" for c, s in pairs)
+        return self.reference.segments.chains.segment_names
 
     def pose(self, load: int) -> Posture:
         """Return the posture at a load, by its number in :attr:`load`; −1 is the last load.

@@ -28,6 +28,7 @@ _T = TypeVar("_T")
 AXIS_NAMES = ("x", "y", "z")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 MOTION_NAMES = ("x", "y", "z", "rx", "ry", "rz")
+_NAMED = {"joint", "cable", "segment", "hole", "load_component"}  # dimensions of dicts in JSON
 
 
 def unit(unit: str, *dims: str, name: str = "") -> Mapping[str, Any]:
@@ -141,7 +142,7 @@ class Result(ReadOnlyState):
         if pose := self._posture:
             numbers = JointUnits(pose.arm.slides).to_dict(pose.arm.joint_names, pose.q)
         for name, value, unit_name, dims in self._quantities():
-            named = bool(dims) and set(dims) <= {"joint", "cable"}
+            named = bool(dims) and {*dims} <= _NAMED & labels.keys()
             entry = _by_name(value, dims, labels) if named else value
             numbers = merged(numbers, {key(name, unit_name): entry})
         return prepare_json(numbers)

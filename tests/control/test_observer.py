@@ -42,7 +42,8 @@ def test_without_friction_exact_sensors_give_angles_rigidity_and_force() -> None
     for state, estimate in observed(0.0)[1:]:
         np.testing.assert_allclose(estimate.pose.q, state.pose.q, atol=1e-9)
         assert 1.0 / estimate.softness == pytest.approx(0.9, abs=1e-6)
-    np.testing.assert_allclose(estimate.force, FORCE[:3], atol=1e-5)
+    np.testing.assert_allclose(estimate.tip_force.force, FORCE[:3], atol=1e-5)
+    assert not estimate.tip_force.band.any()
 
 
 def test_model_of_the_wire_in_the_holes_finds_angles_and_force_under_friction() -> None:
@@ -55,5 +56,8 @@ def test_model_of_the_wire_in_the_holes_finds_angles_and_force_under_friction() 
     inner = state.state.arm_state.chain.tension
     found = estimate.shares * state.true_values.tension[cable]
     even = state.true_values.tension[cable]
+    felt = estimate.tip_force
+    assert (abs(felt.force - FORCE[:3]) <= felt.band + 1.96 * felt.std).all()
+    assert felt.band.min() > 0.0
     # half of what friction changes is found, and more
     assert np.linalg.norm(found - inner) < 0.5 * np.linalg.norm(even - inner)

@@ -1,0 +1,98 @@
+"""Readings and questions that are wrong are refused, with the name of what is wrong."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from tests.estimation.test_loads import readme
+from tests.support.pulleys import finger
+
+POSE = readme(0.1)
+F = np.full(12, 60.0)
+NEGATIVE = np.r_[F[:-1], -5.0]
+
+WRONG: tuple[tuple[dict[str, Any], str], ...] = (
+    ({"motor_tensions": F[1:]}, r"motor_tensions: shape \(11,\) given, \(12,\) needed"),
+    ({"motor_tensions": F * np.nan}, "motor_tensions: .*nan"),
+    ({"motor_tensions": NEGATIVE}, "motor_tensions: -5 N given for cable4_3; cables only pull"),
+    ({"motor_tensions": 0 * F, "tension_std": None}, "tension_std: all readings are 0 N; give"),
+    ({"tension_std": -0.5}, "tension_std: -0.5 given for cable1_1; .* not negative"),
+    ({"tension_std": 0.0}, "tension_std: 0 given for cable1_1; a load cell is not exact"),
+    ({"tension_std": [0.5, 0.5]}, r"tension_std: shape \(2,\) given; give one number, or \(12,\)"),
+    ({"tension_std": np.nan}, "tension_std: nan; finite numbers"),
+    ({"angle_std": -1e-3}, "angle_std: -0.001 given for joint1_1; .* not negative"),
+    ({"angle_std": np.zeros(12)}, r"angle_std: shape \(12,\) given; give one number, or \(8,\)"),
+    ({"links": {"link9": "force"}}, "no link is called 'link9'"),
+    ({"links": {"base_disk": "force"}}, "'base_disk' is the base"),
+    ({"links": {}}, 'links: {} given; give a dict .*"tool0": "force"'),
+    ({"links": ["tool0", "tool0"]}, "links: .* given; give a dict of what is sought"),
+    ({"links": {"tool0": "forces"}}, r"links\['tool0'\]: 'forces' given; give .force., .moment."),
+    ({"links": {"tool0": [0, 6]}}, r"links\['tool0'\]: \[0, 6\] given"),
+    ({"links": {"tool0": [0, True]}}, r"links\['tool0'\]: \[0, True\] given"),
+    ({"links": {"tool0": []}}, r"links\['tool0'\]: \[\] given"),
+    ({"links": {"tool0": ["fx", 0]}}, r"links\['tool0'\]: \['fx', 0\] names a component twice"),
+    (
+        {"links": {"tool0": "wrench", "link2": "force"}},
+        "links: 9 components sought, but the joints give 8 equations; seek fewer",
+    ),
+    (
+        {"links": {"tool0": "force", "link4": "force"}, "points": {"link4": (0.06, 0, 0)}},
+        "links: tool0 and link4 are one point of one body",
+    ),
+    ({"points": {"link2": (0, 0, 0)}}, "points: 'link2' is not among links"),
+    ({"points": {"tool0": (0, 0)}}, r"points\['tool0'\]: shape \(2,\) given"),
+    ({"points": [0, 0, 0]}, r"points: \[0, 0, 0\] given; give a dict"),
+    ({"sliding": 2}, "sliding: 2 given; give 1 where the cable was last taken in"),
+    ({"sliding": 0.5}, "sliding: 0.5 given"),
+    ({"sliding": np.nan}, "sliding: nan"),
+    ({"sliding": True}, "sliding: holds bool entries"),
+    ({"sliding": [1, 1]}, r"sliding: shape \(2,\) given; give one number, one for each of the 12"),
+    ({"sliding": {"cable9": 1}}, "no cable is called 'cable9'"),
+    ({"sliding": {"cable4_3": [1]}}, r"sliding\['cable4_3'\]: shape \(1,\) given; .* its 7 holes"),
+    ({"sliding": {"cable1_1": 3}}, r"sliding\['cable1_1'\]: 3 given"),
+    ({"wrench": [1, 2, 3]}, r"wrench: shape \(3,\) given"),
+    ({"pose": POSE.arm}, "pose: .* a Posture is needed"),
+)
+
+
+@pytest.mark.parametrize(("given", "said"), WRONG, ids=[said[:40] for _, said in WRONG])
+def test_wrong_input_is_named(given: dict[str, Any], said: str) -> None:
+    call: dict[str, Any] = {"pose": POSE, "motor_tensions": F, "tension_std": 0.5, **given}
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        cdsm.estimate_load(call.pop("pose"), call.pop("motor_tensions"), **call)
+
+
+def test_all_joints_at_stops_are_named() -> None:
+    arm = readme(joint_limit=0.2).arm
+    with pytest.raises(cdsm.InvalidInput, match="all joints are at their stops"):
+        cdsm.estimate_tensions(arm.at(arm.upper), F, tension_std=0.5)
+    q = np.r_[arm.upper[:6], 0.0, 0.0]
+    with pytest.raises(cdsm.InvalidInput, match="2 equations, since a stop holds joint1_1"):
+        cdsm.estimate_load(arm.at(q), F, tension_std=0.5)
+
+
+@pytest.mark.parametrize(
+    ("sliding", "known"),
+    [
+        (None, 0),
+        (0, 0),
+        (1, 48),
+        (-1, 48),
+        (np.ones(12), 48),
+        ({"cable2_1": [1, 0, -1]}, 2),
+        ({}, 0),
+    ],
+)
+def test_every_way_to_say_how_cables_slid(sliding: Any, known: int) -> None:
+    found = cdsm.estimate_load(POSE, F, tension_std=0.5, sliding=sliding)
+    assert np.count_nonzero(found.sliding) == known
+    assert "direction of sliding" in str(found)
+
+
+def test_arms_without_geometry_and_with_pulleys() -> None:
+    pose = finger().at([0.2, 0.4, 0.5, 0.3])
+    found = cdsm.estimate_load(pose, np.full(9, 20.0), tension_std=0.1)
+    assert found.names == ("fx at l3", "fy at l3", "fz at l3")
+    assert "no friction" in str(found)
