@@ -20,6 +20,7 @@ from cdsm.control.plants import MuJoCoPlant as MuJoCoPlant
 from cdsm.control.plants import QuasiStaticPlant as QuasiStaticPlant
 from cdsm.control.sensing import Sensors as Sensors
 from cdsm.control.track import track as track
+from cdsm.dead_loads import Load as Load
 from cdsm.design.evaluation import evaluate_designs as evaluate_designs
 from cdsm.design.goals import Constraint as Constraint
 from cdsm.design.goals import Objective as Objective
@@ -57,7 +58,6 @@ from cdsm.interchange.caspr import read_caspr as read_caspr
 from cdsm.interchange.mjcf import to_mjcf as to_mjcf
 from cdsm.kinematics import inverse_kinematics as inverse_kinematics
 from cdsm.kinematics import solve_joint_angles as solve_joint_angles
-from cdsm.loads import Load as Load
 from cdsm.manipulator import Manipulator as Manipulator
 from cdsm.measures.clearance import clearance as clearance
 from cdsm.measures.indices import isotropy as isotropy

@@ -5,7 +5,7 @@ A wrench at the tip alone is kept as the array W (6,), which is fast; see :data:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, ClassVar
@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.arm import ComputedArm
+from cdsm.dead_loads import LinkPoint, Places
 from cdsm.definition import Term
 from cdsm.errors import InvalidInput, listed
 from cdsm.posture import Posture
@@ -33,6 +35,7 @@ class TipLoad:
 
     wrench: Array  # base axes: force [N], then moment [N m]
     reference: Posture | None = None  # of the energy, which is zero there
+    name: ClassVar[str] = "load"
 
     def energy(self, pose: Posture) -> float:
         """Compute U [J] against the reference."""
@@ -63,52 +66,9 @@ class TipLoad:
         return body.coupling.square(load_stiffness(jacobian, self.wrench, body.tip_joints))
 
 
-@dataclass(frozen=True, eq=False)
-class LinkPoint:
-    """Point fixed to a link."""
-
-    link: str
-    local: Array  # (3,) [m] in the frame of the link
-    row: int  # of the joint that carries the link, among placements
-    offset: Array  # (3,) [m] in the frame of this joint
-    joints: NDArray[np.intp]  # from the base to this joint, by their numbers
-
-    @property
-    def key(self) -> tuple[int, bytes]:
-        """What points at one place of one link share."""
-        return self.row, self.offset.tobytes()
-
-    def position(self, pose: Posture) -> Array:
-        """Compute the position (3,) [m] in base axes."""
-        placement = pose.placements[self.row]
-        return np.asarray(placement[:3, :3] @ self.offset + placement[:3, 3])
-
-    def rotation(self, pose: Posture) -> Array:
-        """Return the axes (3, 3) of the joint that carries the link."""
-        return np.asarray(pose.placements[self.row][:3, :3])
-
-    def full_jacobian(self, pose: Posture) -> Array:
-        """Compute its motion (6, n) by all n joints, linear rows first; 0 beyond its link."""
-        v = pose.twist[:3, self.joints]
-        z = pose.twist[3:, self.joints]
-        jacobian = np.zeros((6, pose.twist.shape[1]))
-        jacobian[:, self.joints] = np.vstack([v + cross(z, self.position(pose)[:, None]), z])
-        return jacobian
-
-    def jacobian(self, pose: Posture) -> Array:
-        """Compute its motion (6, nv) by the independent joints, linear rows first."""
-        coupling = pose.arm.body.coupling
-        jacobian = self.full_jacobian(pose)
-        return np.asarray(jacobian @ coupling.matrix) if coupling else jacobian
-
-
 @dataclass(slots=True)
 class PointLoad:
-    """Dead wrench W (6,) at a point of a link, as :class:`TipLoad` at the tip.
-
-    With the twists (v_j, z_j) of the joints from the base to the link, at the point p, its torque
-    is −(f·(v_j + z_j × p) + m·z_j), and 0 of the joints beyond.
-    """
+    """Dead wrench W (6,) at a point of a link, as :class:`TipLoad` at the tip."""
 
     at: LinkPoint
     wrench: Array  # base axes: force [N], then moment [N m]
@@ -124,27 +84,21 @@ class PointLoad:
         turned = Rotation.from_matrix(turn).as_rotvec()
         return float(-self.wrench[:3] @ moved - self.wrench[3:] @ turned)
 
-    def torque(self, pose: Posture) -> Array:
-        """Compute −JᵀW (nv,) [N m] with J of the point."""
-        return np.asarray(-self.wrench @ self.at.jacobian(pose))
-
-    def torque_size(self, pose: Posture) -> Array:
-        """Compute |J|ᵀ |W| (nv,) [N m]."""
-        return np.asarray(abs(self.wrench) @ abs(self.at.jacobian(pose)))
-
-    def stiffness(self, pose: Posture) -> Array:
-        """Compute −∂(JᵀW)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment."""
-        coupling = pose.arm.body.coupling
-        K = load_stiffness(self.at.full_jacobian(pose), self.wrench, self.at.joints)
-        return coupling.square(K) if coupling else K
-
 
 @dataclass(slots=True)
 class Loads:
-    """All loads on the arm."""
+    """All loads on the arm, together: of L loads the cost is that of one.
+
+    Of the loads that joint j moves, let F_j be the sum of the forces f, S_j that of p × f + m about
+    the origin of the base, P_j that of p fᵀ, M_j that of the moments m. With the twists (v, z) of
+    the joints, their torque is −(F_j·v_j + S_j·z_j). Let joint a be before b on the way to a load.
+    K_θ has z_a·(F_b × v_b + tr(P_b) z_b − P_b z_b) in the entries (a, b) and (b, a), also for
+    a = b; moments give −(M_b × z_a)·z_b in the entry (b, a) alone.
+    """
 
     loads: Sequence[TipLoad | PointLoad]
     name: ClassVar[str] = "load"
+    _places: Places | None = None
 
     @property
     def tip_wrench(self) -> Array:
@@ -158,13 +112,15 @@ class Loads:
 
     def measured_from(self, reference: Posture | None) -> Loads:
         """Return them with a reference of their energies."""
-        return Loads(tuple(replace(load, reference=reference) for load in self.loads))
+        if reference is None:
+            return self
+        loads = tuple(replace(load, reference=reference) for load in self.loads)
+        return replace(self, loads=loads)
 
     def scaled(self, share: float) -> Loads:
         """Return a share of all of them."""
-        return Loads(
-            tuple(replace(load, wrench=frozen(share * load.wrench)) for load in self.loads)
-        )
+        loads = (replace(load, wrench=frozen(share * load.wrench)) for load in self.loads)
+        return replace(self, loads=tuple(loads))
 
     def energy(self, pose: Posture) -> float:
         """Compute the sum of the energies [J]."""
@@ -172,15 +128,58 @@ class Loads:
 
     def torque(self, pose: Posture) -> Array:
         """Compute the sum of the torques (nv,) [N m]."""
-        return total([load.torque(pose) for load in self.loads])
+        screws = self._screws(pose)[0].T @ self._at(pose).moved
+        return _reduced(pose, -(screws * pose.twist).sum(axis=0))
 
     def torque_size(self, pose: Posture) -> Array:
         """Compute the sum of the magnitudes of the torques (nv,) [N m]."""
-        return total([load.torque_size(pose) for load in self.loads])
+        screws = abs(self._screws(pose)[0]).T @ self._at(pose).moved
+        coupling = pose.arm.body.coupling
+        size = (screws * abs(pose.twist)).sum(axis=0)
+        return np.asarray(size @ abs(coupling.matrix)) if coupling else size
 
     def stiffness(self, pose: Posture) -> Array:
-        """Compute the sum of the stiffnesses (nv, nv) [N m/rad]."""
-        return total([load.stiffness(pose) for load in self.loads])
+        """Compute the sum of the stiffnesses (nv, nv) [N m/rad]; moments are not symmetric."""
+        screw, point, wrench = self._screws(pose)
+        moved = self._at(pose).moved
+        v, z = np.split(pose.twist, 2)
+        force = screw[:, :3].T @ moved
+        spread = ((point[:, :, None] * wrench[:, None, :3]).reshape(-1, 9).T @ moved).reshape(
+            3, 3, -1
+        )
+        trace = spread[0, 0] + spread[1, 1] + spread[2, 2]
+        turned = cross(force, v) + trace * z - (spread * z).sum(axis=1)
+        before = pose.arm.body.moved_by.T  # of joints a, b: whether a is before b, or is b
+        upper = before * (z.T @ turned)
+        K = upper + upper.T
+        np.fill_diagonal(K, upper.diagonal())
+        if wrench[:, 3:].any():
+            later = before.T - np.eye(len(K))
+            K -= later * (cross(z, wrench[:, 3:].T @ moved).T @ z)
+        coupling = pose.arm.body.coupling
+        return coupling.square(K) if coupling else K
+
+    def _screws(self, pose: Posture) -> tuple[Array, Array, Array]:
+        """Return f, then p × f + m, of each load (L, 6); the points p (L, 3); f, then m (L, 6)."""
+        places = self._at(pose)
+        frame = pose.placements[places.row]
+        point = (frame[:, :3, :3] @ places.offset[:, :, None])[:, :, 0] + frame[:, :3, 3]
+        wrench = np.array([load.wrench for load in self.loads])
+        screw = wrench.copy()
+        screw[:, 3:] += cross(point.T, wrench[:, :3].T).T
+        return screw, point, wrench
+
+    def _at(self, pose: Posture) -> Places:
+        if self._places is None:
+            points = (load.at if isinstance(load, PointLoad) else None for load in self.loads)
+            self._places = Places.of(pose.arm.body, points)
+        return self._places
+
+
+def _reduced(pose: Posture, torque: Array) -> Array:
+    """Return a torque on the independent joints (nv,), from that on all joints (n,)."""
+    coupling = pose.arm.body.coupling
+    return np.asarray(torque @ coupling.matrix) if coupling else torque
 
 
 def load_stiffness(jacobian: Array, wrench: Array, tip_joints: NDArray[np.intp]) -> Array:
@@ -252,6 +251,21 @@ def between(first: Applied, second: Applied, part: float) -> Applied:
     return combined(scaled(first, 1.0 - part), scaled(second, part))
 
 
+def load_at(at: LinkPoint | None, wrench: Array) -> Applied:
+    """Return what a wrench W (6,) at a point is; None: at the tip."""
+    return frozen(wrench) if at is None else Loads((PointLoad(at, wrench),))
+
+
+def jacobian_at(pose: Posture, at: LinkPoint | None) -> Array:
+    """Return the motion (6, nv) of a point by the joints; None: of the tip."""
+    return pose.jacobian if at is None else at.jacobian(pose)
+
+
+def position_at(pose: Posture, at: LinkPoint | None) -> Array:
+    """Return the position (3,) [m] of a point in base axes; None: of the tip."""
+    return pose.tip[:3, 3] if at is None else at.position(pose)
+
+
 def tip_part(applied: Applied) -> Array:
     """Return W (6,) of what acts at the tip."""
     return frozen(applied.tip_wrench) if isinstance(applied, Loads) else applied
@@ -286,27 +300,35 @@ class Loaded:
         return tip_part(self.applied)
 
 
-def described(applied: Applied) -> list[dict[str, object]]:
+def described(arm: ComputedArm, applied: Applied) -> list[dict[str, object]]:
     """Return the loads for JSON; nothing of a wrench at the tip alone."""
     return [
         {
-            "link": load.at.link,
-            "point_m": load.at.local,
-            "force_N": load.wrench[:3],
-            "moment_Nm": load.wrench[3:],
+            "link": at.link,
+            "point_m": at.local,
+            "force_N": W[:3],
+            "moment_Nm": W[3:],
+            **({"of_the_arm": True} if own else {}),
         }
-        for load in as_loads(applied).on_links
+        for own, at, W in _on_links(arm, applied)
     ]
 
 
-def texts(applied: Applied) -> list[str]:
+def _on_links(arm: ComputedArm, applied: Applied) -> Iterator[tuple[bool, LinkPoint, Array]]:
+    """Yield whether a load belongs to the arm, its place and its wrench; none at the tip."""
+    yield from ((True, at, W) for at, W in arm.own_loads)
+    yield from ((False, load.at, load.wrench) for load in as_loads(applied).on_links)
+
+
+def texts(arm: ComputedArm, applied: Applied) -> list[str]:
     """Return a line for each load that does not act at the tip, with its place."""
     lines = []
-    for load in as_loads(applied).on_links:
-        parts = [f"{coordinates(load.wrench[:3])} N"] * bool(load.wrench[:3].any())
-        parts += [f"{coordinates(load.wrench[3:])} N m"] * bool(load.wrench[3:].any())
-        where = f"{coordinates(1e3 * load.at.local)} mm in its frame"
-        lines.append(f"load on {load.at.link}, {where}: {', '.join(parts) or 'none'}")
+    for own, at, W in _on_links(arm, applied):
+        parts = [f"{coordinates(W[:3])} N"] * bool(W[:3].any())
+        parts += [f"{coordinates(W[3:])} N m"] * bool(W[3:].any())
+        where = f"{coordinates(1e3 * at.local)} mm in its frame"
+        whose = "load of the arm" if own else "load"
+        lines.append(f"{whose} on {at.link}, {where}: {', '.join(parts) or 'none'}")
     return lines
 
 
@@ -315,12 +337,23 @@ def without_cables(
 ) -> tuple[Term, ...]:
     """Return all terms but those of the cables: gravity, load, springs, and those of the arm's own.
 
-    ``wrench`` is what acts on the arm, ``reference`` the posture from which its work counts.
+    ``wrench`` is what acts on the arm besides its own loads, ``reference`` the posture from which
+    the work counts.
     """
     gravity, *others = pose.arm.terms
+    if pose.arm.own_loads:
+        wrench = all_loads(pose.arm, wrench)
     if isinstance(wrench, Loads):
         return gravity, wrench.measured_from(reference), *others
-    return gravity, Loads((TipLoad(wrench, reference),)), *others
+    return gravity, TipLoad(wrench, reference), *others
+
+
+def all_loads(arm: ComputedArm, wrench: Applied) -> Loads:
+    """Return what acts on an arm, and the loads that belong to it."""
+    own = (PointLoad(at, W) for at, W in arm.own_loads)
+    if isinstance(wrench, Loads):
+        return Loads((*own, *wrench.loads))
+    return Loads((*own, TipLoad(wrench)), arm.own_places)
 
 
 def required_torque(pose: Posture, wrench: Applied) -> Array:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.cable import Cables
 from cdsm.cable_laws import CableLaws
+from cdsm.dead_loads import LinkPoint, Places, placed_loads
 from cdsm.definition import ArmDefinition
 from cdsm.errors import InvalidInput, listed, warn
 from cdsm.geometry import Geometry
@@ -47,6 +48,8 @@ class ComputedArm(Printed):
         routing: Sites and segments of the cables; contacts with all pulleys, if there are any.
         laws: Elasticities of the cables.
         motors: What moves the cables: ``arm.motors.matrix`` is B (C, M).
+        own_loads: Loads that belong to the arm, such as a gripper: points of links, and wrenches
+            (6,), base axes: force [N], then moment [N m].
     """
 
     definition: ArmDefinition
@@ -56,12 +59,13 @@ class ComputedArm(Printed):
     routing: Routing = field(compare=False)
     laws: CableLaws = field(compare=False)
     motors: Motors = field(compare=False)
+    own_loads: tuple[tuple[LinkPoint, Array], ...] = field(compare=False)
 
     @classmethod
     def of(cls, definition: ArmDefinition, like: Self | None = None) -> Self:
         """Build the arm of a definition; warnings that ``like`` has given are not repeated.
 
-        Raises InvalidInput if a cable, the tip, a spring or a joint name does not fit the URDF.
+        Raises InvalidInput if a cable, the tip, a spring, a joint name or a load does not fit it.
         """
         return cls.__new__(cls).compute(definition, like)
 
@@ -81,7 +85,8 @@ class ComputedArm(Printed):
         laws = CableLaws(cables)
         # once; from here on the arm is frozen
         vars(self).update(definition=named, body=body, springs=springs, routing=routing, laws=laws)
-        vars(self).update(wraps=wraps, motors=Motors(named.motors, cables))
+        own_loads = placed_loads(named.loads, body, named.geometry, "loads")
+        vars(self).update(wraps=wraps, motors=Motors(named.motors, cables), own_loads=own_loads)
         for doubt in self._doubts:
             if like is None or doubt not in like._doubts:
                 warn(f"{self.name}: {doubt}")
@@ -207,6 +212,11 @@ class ComputedArm(Printed):
     def has_friction(self) -> bool:
         """Whether any cable has friction in a hole. Results that neglect this friction say so."""
         return any(any(cable.friction) for cable in self.cables)
+
+    @cached_property
+    def own_places(self) -> Places:
+        """Where the loads act that belong to the arm, and the tip behind them."""
+        return Places.of(self.body, [*(at for at, _ in self.own_loads), None])
 
     @property
     def joint_units(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from typing import Any, Protocol, final
 
 from cdsm.cable import Cable, Cables
 from cdsm.cable_path import positions
+from cdsm.dead_loads import Load
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry import Geometry
 from cdsm.joint_springs import Spring
@@ -98,6 +99,7 @@ class ArmDefinition:
         terms: Further terms of the energy, as for :meth:`Manipulator.with_terms`.
         motors: Motors that move several cables, or yield, as for :meth:`Manipulator.with_motors`;
             a cable that none of them moves has a motor of its own.
+        loads: Loads that belong to the arm, as for :meth:`Manipulator.with_loads`.
 
     Raises:
         InvalidInput: Gravity is not three numbers, or joint names are no texts. There are no
@@ -114,6 +116,7 @@ class ArmDefinition:
     springs: Mapping[str, Spring] | None = None
     terms: tuple[Term, ...] = ()
     motors: tuple[Motor, ...] = ()
+    loads: tuple[Load, ...] = ()
 
     def __post_init__(self) -> None:  # fields may be given as other sequences, or an axis
         gravity = gravity_vector("gravity", self.gravity)
@@ -126,6 +129,7 @@ class ArmDefinition:
             "tolerances": instance("tolerances", self.tolerances, Tolerances),
             "terms": checked_terms(self.terms),
             "motors": checked_motors(self.motors, cables) if self.motors else (),
+            "loads": sequence_of("loads", self.loads, Load),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.arm import ComputedArm
 from cdsm.cable import Cable, serpentine_cables
+from cdsm.dead_loads import Load
 from cdsm.definition import ArmDefinition, Term
 from cdsm.errors import InvalidInput
 from cdsm.geometry import Geometry
@@ -358,6 +359,20 @@ class Manipulator(ComputedArm):
             [61.3, 38.6]
         """
         return self.replace(motors=motors)
+
+    def with_loads(self, loads: Load | Sequence[Load]) -> Manipulator:
+        """Return the same arm with these loads that belong to it, and no others.
+
+        They act wherever the arm does, besides any ``wrench``: such as a gripper or a camera, by
+        its weight. They count in ``K.load``, and move with no gravity: they are dead forces.
+
+        Args:
+            loads: One or more :class:`~cdsm.Load`.
+
+        Raises:
+            InvalidInput: A link does not exist or is the base, or two loads act at one point.
+        """
+        return self.replace(loads=[loads] if isinstance(loads, Load) else loads)
 
     def with_gravity(self, gravity: Direction) -> Manipulator:
         """Return the same arm under another gravity: (3,) [m/s²] in base axes, or an axis.

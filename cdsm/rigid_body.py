@@ -10,6 +10,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 from copy import deepcopy
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -112,6 +113,7 @@ class RigidBody:
         self._scratch = threading.local()
         self.parent: list[int] = list(model.parents)
         to_tip = self.joints_to(model.frames[self._tip].parentJoint)
+        self.tip_row, _, self.tip_offset = self.locate(tip)
         self.tip_joints = frozen(np.array(to_tip, np.intp) - 1)
         self._twists = frozen(self._local_twists())
         slides = np.asarray(~self._twists[1:, 3:].any(axis=1))
@@ -184,6 +186,15 @@ class RigidBody:
         frame = self._model.frames[self._frame(link)]
         place = frame.placement
         return int(frame.parentJoint), place.rotation.copy(), place.translation.copy()
+
+    @cached_property
+    def moved_by(self) -> Array:
+        """1 where joint a, the column, moves what joint b, the row, carries; else 0 (n, n)."""
+        moves = np.eye(len(self.all_joints))
+        for b, row in enumerate(self.parent[1:]):
+            if row:
+                moves[b] += moves[row - 1]
+        return frozen(moves)
 
     def joint_axis(self, joint: str) -> tuple[str, Array, Array]:
         """Return the link before a joint, and a point of the joint's axis and the axis (3,) there.

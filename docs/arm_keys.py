@@ -37,6 +37,7 @@ def table() -> str:
         *_rows("`sites`, a pulley at a joint", {key: at_joint[key] for key in ("joint", "turn")}),
         *_rows("`sites`, a sheath", {"sheath": sheath["length"], "pieces": sheath["pieces"]}),
         *_rows("`[motors.NAME]`", {key: motor[key] for key in ("cables", "stiffness", "control")}),
+        *_rows("`[[loads]]`", attributes_of(cdsm.Load)),
         *_rows("`[urdf]`", attributes_of(Urdf)),
         *_rows("`[universal]`, `[hinged]`", attributes_of(cdsm.Geometry.universal)),
         *_rows("`[hinged]`", {"twist": "Angle about x from each hinge axis to the next [rad]."}),

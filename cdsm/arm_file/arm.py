@@ -18,6 +18,7 @@ from cdsm.arm_file.model import ArmFile, read_model
 from cdsm.arm_file.path_entries import entry_table
 from cdsm.cable import SETTINGS, Cable, serpentine_cables
 from cdsm.cable_path import Site
+from cdsm.dead_loads import Load
 from cdsm.definition import ArmDefinition, refuse_terms
 from cdsm.errors import FileError, GeometryError, InvalidInput
 from cdsm.joint_springs import Spring
@@ -176,10 +177,19 @@ def _motor_tables(motors: Sequence[Motor]) -> dict[str, Any]:
     return tables
 
 
+def _load_tables(loads: Sequence[Load]) -> list[dict[str, Any]] | None:
+    """Return the tables [[loads]], without a force or moment that is zero; None without loads."""
+    tables = [
+        {key: x for key, x in vars(load).items() if key == "point" or any(x)} for load in loads
+    ]
+    return tables or None
+
+
 _TABLES: Final[dict[str, Callable[[Any], Any]]] = {
     "springs": _spring_tables,
     "tolerances": tolerance_table,
     "motors": _motor_tables,
+    "loads": _load_tables,
 }
 
 

@@ -26,7 +26,8 @@ from pydantic import ValidationInfo as Info
 
 from cdsm.arm_file.path_entries import Label, PathEntry
 from cdsm.cable import SETTINGS, Cable, Cables, serpentine_cables
-from cdsm.errors import LINES, FileError, GeometryError, listed, warn
+from cdsm.dead_loads import Load
+from cdsm.errors import LINES, FileError, GeometryError, InvalidInput, listed, warn
 from cdsm.geometry import Geometry, toml
 from cdsm.motors import Motor, MotorControl, checked_motors, require_cables
 from cdsm.rigid_body import GRAVITY
@@ -227,6 +228,30 @@ class _Routed(_Settings):
 
 
 @record
+class _OwnLoad:
+    link: str
+    force: records.Vector = (0.0, 0.0, 0.0)
+    moment: records.Vector = (0.0, 0.0, 0.0)
+    point: records.Position | None = None
+
+
+def _loads(tables: tuple[_OwnLoad, ...]) -> tuple[Load, ...]:
+    faults = list[str]()
+    loads = list[Load]()
+    for i, table in enumerate(tables, start=1):
+        try:
+            loads.append(Load(**vars(table)))
+        except InvalidInput as error:
+            faults += records.faults_at(f"[{i}].{error.name}", error)
+    if faults:
+        raise CrossFaults(faults)
+    return tuple(loads)
+
+
+_OwnLoads = Annotated[tuple[_OwnLoad, ...], Field(strict=False), AfterValidator(_loads)]
+
+
+@record
 class Urdf:
     """The keys of the table [urdf].
 
@@ -362,6 +387,7 @@ class ArmFile(_Settings, _Wires):
             no torque ``[2.0, 0.1]``. Or a law: ``{stiffness = 0.56, exponent = 0.74, scale =
             0.035}``, or points ``{angles = [0.1, 0.2], torques = [0.05, 0.08]}`` [rad, N m]; both
             may have an ``angle`` of no torque.
+        loads: Tables ``[[loads]]``, dead loads that belong to the arm, as of a gripper or a camera.
         tolerances: Table of standard deviations, with a key for each source.
         urdf: Table of a robot that no generator makes.
         lead: Straight cable between actuator and first site [m], of all ``[[cables]]``.
@@ -376,6 +402,7 @@ class ArmFile(_Settings, _Wires):
     original_length: Annotated[Any, AfterValidator(_unstrained)] = None
     tolerances: Annotated[Tolerances, PlainValidator(tolerances_from)] = Tolerances()
     springs: dict[str, _Spring] | None = None
+    loads: _OwnLoads = ()
     geometry: Annotated[Any, PlainValidator(_described), Field(alias=_ROBOT)] = None
     urdf: Annotated[Urdf | None, AfterValidator(_alone)] = None
     lead: Annotated[records.LengthOrZero | None, AfterValidator(_of_routed)] = None

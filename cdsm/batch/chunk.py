@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 
 from cdsm import readings
 from cdsm.batch.quantities import READINGS, Codes, read
-from cdsm.batch.rows import BodyArrays, PoseArrays, Rows, one_by_one, side_by_side, tables_of
+from cdsm.batch.rows import (
+    BodyArrays,
+    LoadArrays,
+    PoseArrays,
+    Rows,
+    one_by_one,
+    side_by_side,
+    tables_of,
+)
 from cdsm.batch.spring_rows import SpringRows
 from cdsm.definition import TERMS_OF_K
 from cdsm.quantities import QUANTITIES
@@ -67,6 +75,7 @@ class Chunk:
         self._names = set(rows.names)
         self._q = rows.q[part]
         self._width = width if kernels.COMPILED else len(self._q)
+        self._loads = rows.all_loads
         lost = rows.status
         self.status: Codes = np.zeros(len(self._q), np.uint8) if lost is None else lost[part].copy()
         self._springs: SpringRows | None = None  # of an arm with laws, set with the posture
@@ -108,8 +117,13 @@ class Chunk:
         table = self._table
         angles = table.coupling.angles(self._q) if table.coupling else self._q
         q = side_by_side(angles, self._width)
-        shapes = table.shapes.items()
-        arrays = (self._scratch.empty(name, len(q), *shape, self._width) for name, shape in shapes)
+        shapes = dict(table.shapes)
+        if self._loads is not None:
+            shapes |= dict.fromkeys(("turned", "moment"), (q.shape[1], 3))
+        arrays = (
+            self._scratch.empty(f"{name}{shape}", len(q), *shape, self._width)
+            for name, shape in shapes.items()
+        )
         at = PoseArrays(*arrays)
         body = self._body()
         given = self._rows.body
@@ -117,10 +131,18 @@ class Chunk:
         self._springs = laws = SpringRows.at(self._rows.arm.springs, angles, k)
         if laws:
             body = body._replace(spring=frozen(body.spring * laws.linear[:, None]))
-        self._kernels.fill_pose(table.arm, body, q, W, at)
+        self._kernels.fill_pose(table.arm, body, q, W, self._load_arrays(), at)
         if laws:
             np.subtract(at.torque, side_by_side(laws.torque, self._width), out=at.torque)
         return at
+
+    def _load_arrays(self) -> LoadArrays:
+        """Return the loads on links in blocks; read-only as :meth:`_body`, but for the wrenches."""
+        points = () if self._loads is None else self._loads.points
+        wrenches = np.zeros((1, 0, 6)) if self._loads is None else self._loads.wrenches
+        frame = np.array([point.row for point in points], np.intp)
+        offset = np.array([point.offset for point in points]).reshape(-1, 3)
+        return LoadArrays(frozen(frame), frozen(offset), self._blocks(wrenches))
 
     def _by_independent_joints(self, at: PoseArrays) -> PoseArrays:
         """Return derivatives by the independent joints in place of those by all."""
@@ -274,7 +296,7 @@ class Chunk:
         if "along" in self._names:
             u = self._rows.directions.copy()  # writable, whatever u is: the kernel compiles once
             along = np.empty((len(F), len(u), self._width))
-            moment = bool(W[:, 3:].any())
+            moment = bool(W[:, 3:].any() or at.moment.any())
             self._kernels.fill_along(K, size, at.tip_jacobian, u, moment, UNMOVED, along, pivot)
             values["along"] = self._one_by_one(along)
         return values, self._one_by_one(pivot)

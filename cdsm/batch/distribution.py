@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.applied import Loads
 from cdsm.batch.quantities import Codes, OfPostures
-from cdsm.batch.rows import Rows
+from cdsm.batch.rows import AppliedRows, RowLoads, Rows
 from cdsm.batch.solution import solve_rows
+from cdsm.dead_loads import LinkPoint, Load, placed_loads
 from cdsm.errors import InvalidInput
+from cdsm.loads import is_tip, loads_in
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import WRENCH, flag, instance, number_array, whole_number
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
+
+RowsOfLoads = ArrayLike | Mapping[str, ArrayLike] | Sequence[Load] | Load | Loads | AppliedRows
+"""A wrench (6,) or (B, 6) at the tip; or such wrenches by the names of links; or loads."""
 
 
 @final
@@ -29,10 +36,11 @@ class Tensions(OfPostures):
         arm: The arm.
         q: Joint angles (B, nv) [rad].
         values: F (B, C) [N], in the order of ``arm.cables``; NaN where no tensions were found.
-        wrench: W (6,) for all postures, or (B, 6): force [N], then moment [N m].
+        wrench: W (6,) at the tip for all postures, or (B, 6): force [N], then moment [N m].
         minimum: Lower bounds (C,) for all postures, or (B, C) [N].
         maximum: Upper bounds (C,) for all postures, or (B, C) [N].
         status: :class:`Status` of each posture (B,).
+        loads: Loads on links; None if there are none.
     """
 
     arm: Manipulator
@@ -42,6 +50,7 @@ class Tensions(OfPostures):
     minimum: Array
     maximum: Array
     status: Codes
+    loads: RowLoads | None = None
 
     @property
     def by_name(self) -> dict[str, Array]:
@@ -54,7 +63,7 @@ def distribute_tensions(
     q: ArrayLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
-    wrench: ArrayLike | None = None,
+    wrench: RowsOfLoads | None = None,
     *,
     check_limits: bool = True,
     threads: int | None = None,
@@ -70,7 +79,8 @@ def distribute_tensions(
         minimum: Lower bound [N]: one number for all cables, (C,) or (B, C); not negative.
         maximum: Upper bound [N]: one number, (C,) or (B, C); inf for no bound.
         wrench: W (6,) for all postures or (B, 6) at ``tool0`` in base axes: force [N], then moment
-            [N m]; zero if not given.
+            [N m]; zero if not given. Or loads on any links: a dict of such wrenches by link, or a
+            list of :class:`~cdsm.Load`.
         check_limits: Skip postures beyond the joint limits; their status is ``BEYOND_LIMITS``.
         threads: Maximum number of threads; by default one for each core.
 
@@ -89,11 +99,12 @@ def distribute_tensions(
     instance("arm", arm, Manipulator)
     angles = postures(arm, q)
     low, high = checked_bounds(arm, minimum, maximum, len(angles))
-    loads = check_wrench_rows(wrench, len(angles))
+    at_tip, loads = check_load_rows(arm, wrench, len(angles))
     rows = Rows(
         arm=arm,
         q=angles,
-        wrench=np.atleast_2d(loads),
+        wrench=np.atleast_2d(at_tip),
+        loads=loads,
         names=("tension",),
         bounds=(np.atleast_2d(low), np.atleast_2d(high)),
         check_limits=flag("check_limits", check_limits),
@@ -103,7 +114,8 @@ def distribute_tensions(
         arm=arm,
         q=angles,
         values=frozen(quantities["tension"]),
-        wrench=loads,
+        wrench=at_tip,
+        loads=loads,
         minimum=low,
         maximum=high,
         status=frozen(status),
@@ -152,9 +164,40 @@ def check_tension_rows(arm: Manipulator, value: ArrayLike, rows: int) -> Array:
     return tension
 
 
-def check_wrench_rows(value: ArrayLike | None, rows: int) -> Array:
-    """Check a wrench (6,) or (rows, 6), zero if None; return it as a read-only array."""
-    return per_row("wrench", np.zeros(6) if value is None else value, rows, 6, WRENCH, "wrench")
+def check_load_rows(
+    arm: Manipulator, value: RowsOfLoads | None, rows: int, name: str = "wrench"
+) -> AppliedRows:
+    """Check what acts on an arm, in all rows or in each; zero if None."""
+
+    def checked(name: str, value: Any) -> Array:
+        return per_row(name, value, rows, 6, WRENCH, "wrench")
+
+    if isinstance(value, AppliedRows):
+        return value
+    if isinstance(value, Mapping):
+        given = [Load(link) for link in value]
+        wrenches = [checked(f"{name}[{link!r}]", W) for link, W in value.items()]
+    else:
+        loads = None if value is None else loads_in(arm, value, name)
+        if loads is None:
+            return AppliedRows(checked(name, np.zeros(6) if value is None else value))
+        given = loads
+        wrenches = [load.wrench for load in loads]
+    at_tip = frozen(np.zeros(6))
+    points = list[LinkPoint]()
+    on_links = list[Array]()
+    placed = placed_loads(given, arm.body, arm.definition.geometry, name)
+    for (at, _), W in zip(placed, wrenches, strict=True):
+        if is_tip(arm, at):
+            at_tip = W
+        else:
+            points.append(at)
+            on_links.append(W)
+    if not points:
+        return AppliedRows(at_tip)
+    shape = (rows if any(W.ndim > 1 for W in on_links) else 1, 6)
+    stacked = np.stack([np.broadcast_to(W, shape) for W in on_links], axis=1)
+    return AppliedRows(at_tip, RowLoads(tuple(points), frozen(stacked)))
 
 
 def checked_threads(threads: int | None) -> int:

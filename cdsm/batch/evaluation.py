@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch.distribution import (
+    RowsOfLoads,
     Tensions,
+    check_load_rows,
     check_tension_rows,
-    check_wrench_rows,
     checked_threads,
     postures,
 )
 from cdsm.batch.quantities import Codes, OfPostures
-from cdsm.batch.rows import Rows
+from cdsm.batch.rows import RowLoads, Rows
 from cdsm.batch.solution import solve_rows
 from cdsm.errors import InvalidInput, unknown
 from cdsm.manipulator import ANOTHER_ARM, Manipulator
@@ -49,7 +50,7 @@ class Batch(OfPostures, IndexedByName):
         arm: The arm.
         q: Joint angles (B, nv) [rad].
         tension: Given tensions, (C,) for all postures or (B, C) [N]; None if not given.
-        wrench: W (6,) for all postures, or (B, 6): force [N], then moment [N m].
+        wrench: W (6,) at the tip for all postures, or (B, 6): force [N], then moment [N m].
         minimum: Lower bounds (C,) for all postures or (B, C) [N]; None if F was not distributed.
         maximum: Upper bounds (C,) for all postures or (B, C) [N], or None.
         direction: Unit direction (3,) of ``along``, or several (D, 3); or None.
@@ -57,6 +58,7 @@ class Batch(OfPostures, IndexedByName):
         outputs: Names of the requested quantities.
         values: The requested quantities, (B, …) each, in the order of ``outputs``, in SI units such
             as [m], [N] and [rad].
+        loads: Loads on links; None if there are none.
     """
 
     arm: Manipulator
@@ -69,6 +71,7 @@ class Batch(OfPostures, IndexedByName):
     status: Codes
     outputs: tuple[str, ...]
     values: tuple[Array, ...]
+    loads: RowLoads | None = None
 
     def __getitem__(self, name: str) -> Array:
         """Return a quantity by name, (B, …), in the unit that it has for one posture.
@@ -106,7 +109,7 @@ def evaluate(
     arm: Manipulator,
     q: ArrayLike,
     tension: Tensions | ArrayLike | None = None,
-    wrench: ArrayLike | None = None,
+    wrench: RowsOfLoads | None = None,
     outputs: Sequence[str] = DEFAULT_OUTPUTS,
     *,
     direction: Direction | Sequence[Direction] | None = None,
@@ -128,7 +131,8 @@ def evaluate(
             :func:`distribute_tensions` at these postures. Omit it if ``minimum`` is given or no
             output depends on tensions.
         wrench: W (6,) for all postures or (B, 6) at ``tool0`` in base axes: force [N], then moment
-            [N m]; zero if not given. Omit it if ``tension`` is a result of
+            [N m]; zero if not given. Or loads on any links: a dict of such wrenches by link, or a
+            list of :class:`~cdsm.Load`. Omit it if ``tension`` is a result of
             :func:`distribute_tensions`, which contains it.
         outputs: Names of the quantities to store. Of a posture: ``"tip"``, ``"jacobian"``,
             ``"cable_lengths"``, ``"length_jacobian"``, ``"gravity_torque"``. Of a stiffness:
@@ -161,7 +165,7 @@ def evaluate(
     rows = len(angles)
     if (direction is None) != ("along" not in names):
         raise InvalidInput("direction", "belongs to the output along: give both, or neither.")
-    F, loads, lost = _checked_load(arm, angles, tension, wrench)
+    F, at_tip, loads, lost = _checked_load(arm, angles, tension, wrench)
     bounds = None
     if minimum is not None:
         if F is not None:
@@ -179,7 +183,8 @@ def evaluate(
     asked = Rows(
         arm=arm,
         q=angles,
-        wrench=np.atleast_2d(loads),
+        wrench=np.atleast_2d(at_tip),
+        loads=loads,
         names=names,
         tension=None if F is None else np.atleast_2d(F),
         bounds=(np.atleast_2d(bounds[0]), np.atleast_2d(bounds[1])) if bounds and needy else None,
@@ -194,7 +199,8 @@ def evaluate(
         arm=arm,
         q=angles,
         tension=F,
-        wrench=loads,
+        wrench=at_tip,
+        loads=loads,
         minimum=None if bounds is None else bounds[0],
         maximum=None if bounds is None else bounds[1],
         direction=u,
@@ -215,16 +221,16 @@ def _checked_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
 
 
 def _checked_load(
-    arm: Manipulator, q: Array, tension: Tensions | ArrayLike | None, wrench: ArrayLike | None
-) -> tuple[Array | None, Array, Codes | None]:
-    """Return checked tensions (None if not given) and wrench, and the status (B,) of theirs."""
+    arm: Manipulator, q: Array, tension: Tensions | ArrayLike | None, wrench: RowsOfLoads | None
+) -> tuple[Array | None, Array, RowLoads | None, Codes | None]:
+    """Return checked tensions (None if not given), wrench and loads, and the tensions' status."""
     if not isinstance(tension, Tensions):
         F = None if tension is None else check_tension_rows(arm, tension, len(q))
-        return F, check_wrench_rows(wrench, len(q)), None
+        return F, *check_load_rows(arm, wrench, len(q)), None
     if not np.array_equal(tension.q, q):
         raise InvalidInput("tension", "was distributed at other postures; distribute it at these.")
     if tension.arm != arm:
         raise InvalidInput("tension", f"was distributed for {ANOTHER_ARM}")
     if wrench is not None:
         raise InvalidInput("wrench", "comes with the Tensions; leave it out here.")
-    return tension.values, tension.wrench, tension.status
+    return tension.values, tension.wrench, tension.loads, tension.status

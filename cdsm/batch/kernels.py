@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
-    from cdsm.batch.rows import ArmArrays, BodyArrays, PoseArrays
+    from cdsm.batch.rows import ArmArrays, BodyArrays, LoadArrays, PoseArrays
 
 COMPILED = bool(globals().get("COMPILED", True))
 """Whether numba compiles this module; :mod:`cdsm.batch.solution` also loads it without."""
@@ -200,9 +200,81 @@ def _hessian_row(u: Array, d: Array, z: Array, F: Array, sign: float, out: Array
         out[2, w] = h * (d[2, w] - rate * u[2, w]) + g * (u[0, w] * z[1, w] - u[1, w] * z[0, w])
 
 
+@inner_loop
+def _add_spread(p: Array, f: Array, out: Array) -> None:
+    """Add p fᵀ to a matrix (3, 3, W)."""
+    for x in range(3):
+        for y in range(3):
+            _add_product(p[x], f[y], out[x, y])
+
+
+@inner_loop
+def _add_turned(f: Array, v: Array, z: Array, P: Array, out: Array) -> None:
+    """Add f × v + tr(P) z − P z, how Σ f × (v + z × p) follows from f = Σ f and P = Σ p fᵀ."""
+    _add_cross(f, v, out)
+    for x in range(3):
+        for w in lanes(out):
+            out[x, w] += (P[0, 0, w] + P[1, 1, w] + P[2, 2, w]) * z[x, w]
+            out[x, w] -= P[x, 0, w] * z[0, w] + P[x, 1, w] * z[1, w] + P[x, 2, w] * z[2, w]
+
+
+@inner_loop
+def _add_loads(
+    arm: ArmArrays, loads: LoadArrays, b: int, frames: tuple[Array, Array, Array], at: PoseArrays
+) -> None:
+    """Add the torques of loads on links, and fill what their stiffness needs.
+
+    ``frames`` are rotations (n+1, 3, 3, W) and origins (n+1, 3, W) of all frames, and v (n, 3, W).
+    """
+    R, o, v = frames
+    n = len(arm.parent)
+    W = o.shape[2]
+    force = np.zeros((n + 1, 3, W))
+    about = np.zeros((n + 1, 3, W))  # Σ p × f + m
+    moment = np.zeros((n + 1, 3, W))
+    spread = np.zeros((n + 1, 3, 3, W))  # Σ p fᵀ
+    point = np.empty((3, W))
+    for k in range(len(loads.frame)):
+        frame = loads.frame[k]
+        f = loads.wrench[b, k, :3]
+        m = loads.wrench[b, k, 3:]
+        for x in range(3):
+            _rotate(R[frame, x], loads.point[k], point[x])
+            _add(o[frame, x], point[x])
+            _add(f[x], force[frame, x])
+            _add(m[x], about[frame, x])
+            _add(m[x], moment[frame, x])
+        _add_cross(point, f, about[frame])
+        _add_spread(point, f, spread[frame])
+    at.turned[b] = 0.0
+    for j in range(n, 0, -1):
+        z = at.axis[b, j - 1]
+        _add_dot(force[j], v[j - 1], at.torque[b, j - 1])
+        _add_dot(about[j], z, at.torque[b, j - 1])
+        _add_turned(force[j], v[j - 1], z, spread[j], at.turned[b, j - 1])
+        at.moment[b, j - 1] = moment[j]
+        k = arm.parent[j - 1]
+        for x in range(3):
+            _add(force[j, x], force[k, x])
+            _add(about[j, x], about[k, x])
+            _add(moment[j, x], moment[k, x])
+            for y in range(3):
+                _add(spread[j, x, y], spread[k, x, y])
+
+
 @kernel
-def fill_pose(arm: ArmArrays, body: BodyArrays, q: Array, wrench: Array, at: PoseArrays) -> None:
-    """Fill ``at`` for joint angles q (B, n, W) and wrenches (B, 6, W)."""
+def fill_pose(
+    arm: ArmArrays,
+    body: BodyArrays,
+    q: Array,
+    wrench: Array,
+    loads: LoadArrays,
+    at: PoseArrays,
+) -> None:
+    """Fill ``at`` for joint angles q (B, n, W), wrenches (B, 6, W) at the tip, and loads on links.
+
+    Without loads, ``at.turned`` and ``at.moment`` are empty.
+    """
     n = len(arm.parent)
     P = len(arm.frame)
     W = q.shape[2]
@@ -294,6 +366,8 @@ def fill_pose(arm: ArmArrays, body: BodyArrays, q: Array, wrench: Array, at: Pos
             for w in lanes(torque):
                 turned = body.spring[shared, j, w] * (q[b, j, w] - arm.free[j])
                 torque[w] -= at.gravity[b, j, w] + turned
+        if len(loads.frame):
+            _add_loads(arm, loads, b, (R, o, v), at)
 
 
 @kernel
@@ -372,6 +446,11 @@ def fill_stiffness(
                 for j in range(i, n):
                     if arm.moves[j, i]:
                         _add_dot(moment, moved[j], term[i, j])
+            if loaded and at.turned.shape[1]:  # loads on links
+                for i in range(n):
+                    for j in range(i, n):
+                        if arm.moves[j, i]:
+                            _add_dot(z[i], at.turned[b, j], term[i, j])
             _accumulate_diagonal(term, diagonal, size[b])
 
         if has_springs:
@@ -391,6 +470,10 @@ def fill_stiffness(
                     moment[:] = 0.0
                     _add_cross(at.tip_jacobian[b, 1, j], wrench[b, 3:], moment)
                     _add_dot(moment, at.tip_jacobian[b, 1, i], K[b, load, i, j])
+                    if at.moment.shape[1]:
+                        moment[:] = 0.0
+                        _add_cross(z[j], at.moment[b, i], moment)
+                        _add_dot(moment, z[i], K[b, load, i, j])
 
 
 @inner_loop

@@ -8,14 +8,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
-from functools import cache, lru_cache, partial
+from functools import cache, cached_property, lru_cache, partial
 from itertools import combinations
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.applied import Applied, Loads, PointLoad, TipLoad, as_loads, tip_part
 from cdsm.batch.quantities import Codes
+from cdsm.dead_loads import LinkPoint
 from cdsm.errors import InvalidInput, listed
 from cdsm.manipulator import Manipulator
 from cdsm.routing import Indices
@@ -73,6 +75,8 @@ class PoseArrays(NamedTuple):
     jacobian: Array  # J_L (B, C, n, W)
     gravity: Array  # g (B, n, W)
     torque: Array  # J_Xᵀ W − g, which the cables balance (B, n, W)
+    turned: Array  # Σ f × (v_j + z_j × p) over the loads that each joint moves (B, n or 0, 3, W)
+    moment: Array  # Σ m over them (B, n or 0, 3, W)
     tip_jacobian: Array  # J_X, linear and angular part (B, 2, n, 3, W)
     tip: Array  # rotation and position of the tip (B, 4, 3, W)
     axis: Array  # z (B, n, 3, W)
@@ -80,6 +84,63 @@ class PoseArrays(NamedTuple):
     segment: Array  # direction, and 1/length of each segment (B, S, 4, W)
     motion: Array  # d of each joint of each segment (B, S, m, 3, W)
     shortest: Array  # length of the shortest segment (B, W) [m]
+
+
+class LoadArrays(NamedTuple):
+    """Loads on L points of links."""
+
+    frame: Indices  # frame of each point (L,)
+    point: Array  # in this frame (L, 3) [m]
+    wrench: Array  # force and moment, base axes (B, L, 6, W)
+
+
+@dataclass(frozen=True, eq=False)
+class RowLoads:
+    """Loads on links, for all postures or for each."""
+
+    points: tuple[LinkPoint, ...]
+    wrenches: Array  # (1, L, 6) for all rows or (N, L, 6): force [N], then moment [N m]
+
+    def of(self, rows: Indices) -> RowLoads:
+        """Return the loads of some rows."""
+        if len(self.wrenches) == 1:
+            return self
+        return RowLoads(self.points, frozen(self.wrenches[rows]))
+
+
+class AppliedRows(NamedTuple):
+    """What acts on an arm in each row."""
+
+    at_tip: Array  # W (6,) for all rows or (N, 6): force [N], then moment [N m]
+    loads: RowLoads | None = None  # on links
+
+    @classmethod
+    def of(cls, cases: Sequence[Applied]) -> AppliedRows:
+        """Return rows in each of which another case acts."""
+        at_tip = frozen(np.array([tip_part(applied) for applied in cases]))
+        on_links = [as_loads(applied).on_links for applied in cases]
+        points = {load.at.key: load.at for loads in on_links for load in loads}
+        if not points:
+            return cls(at_tip)
+        place = {key: i for i, key in enumerate(points)}
+        wrenches = np.zeros((len(cases), len(points), 6))
+        for row, loads in zip(wrenches, on_links, strict=True):
+            for load in loads:
+                row[place[load.at.key]] += load.wrench
+        return cls(at_tip, RowLoads(tuple(points.values()), frozen(wrenches)))
+
+    def case(self, row: int) -> Applied:
+        """Return what acts in a row."""
+        at_tip = self.at_tip if self.at_tip.ndim == 1 else frozen(self.at_tip[row].copy())
+        if self.loads is None:
+            return at_tip
+        wrenches = self.loads.wrenches[row if len(self.loads.wrenches) > 1 else 0]
+        pairs = zip(self.loads.points, wrenches, strict=True)
+        return Loads((TipLoad(at_tip), *(PointLoad(at, frozen(W.copy())) for at, W in pairs)))
+
+    def of_rows(self, rows: Indices) -> AppliedRows:
+        """Return what acts in some rows, of as many rows as there are."""
+        return AppliedRows(self.at_tip[rows], self.loads.of(rows) if self.loads else None)
 
 
 _KERNELS = frozenset(("gravity", "springs"))  # terms of an arm that the kernels compute
@@ -99,7 +160,8 @@ class Rows:
     Attributes:
         arm: The arm.
         q: Joint angles (N, nv).
-        wrench: W (N, 6).
+        wrench: W (N, 6) at the tip.
+        loads: Loads on links, besides those that belong to the arm.
         names: The quantities to compute.
         tension: Given F (N, C) [N], or None.
         bounds: Lower and upper bounds of F to distribute, (N, C) each [N], or None.
@@ -125,6 +187,22 @@ class Rows:
     status: Codes | None = None
     touches: tuple[bool, ...] | None = None
     shifts: Callable[[Array, slice], Array] | None = None
+    loads: RowLoads | None = None
+
+    @cached_property
+    def all_loads(self) -> RowLoads | None:
+        """Loads on links, those that belong to the arm included; None if there are none."""
+        own = self.arm.own_loads
+        if not own:
+            return self.loads
+        points = tuple(at for at, _ in own)
+        wrenches = np.array([[W for _, W in own]])
+        if self.loads is None:
+            return RowLoads(points, frozen(wrenches))
+        given = self.loads.wrenches
+        shared = np.broadcast_to(wrenches, (len(given), *wrenches.shape[1:]))
+        together = frozen(np.concatenate([shared, given], axis=1))
+        return RowLoads((*points, *self.loads.points), together)
 
 
 class ArmTables:
@@ -198,6 +276,8 @@ class ArmTables:
             "jacobian": (C, n),
             "gravity": (n,),
             "torque": (n,),
+            "turned": (0, 3),
+            "moment": (0, 3),
             "tip_jacobian": (2, n, 3),
             "tip": (4, 3),
             "axis": (n, 3),
@@ -231,14 +311,15 @@ def side_by_side(values: Array, width: int) -> Array:
     missing = -count % width
     if missing:
         values = np.concatenate([values, np.repeat(values[-1:], missing, axis=0)])
-    blocks = values.reshape(-1, width, *values.shape[1:])
+    blocks = values.reshape(len(values) // width, width, *values.shape[1:])
     return np.ascontiguousarray(blocks.transpose(0, *range(2, blocks.ndim), 1))
 
 
 def one_by_one(values: NDArray[_Scalar], count: int) -> NDArray[_Scalar]:
     """Undo :func:`side_by_side`: (B, …, W) to (N, …)."""
     last = values.ndim - 1
-    return values.transpose(0, last, *range(1, last)).reshape(-1, *values.shape[1:-1])[:count]
+    rows = len(values) * values.shape[last]
+    return values.transpose(0, last, *range(1, last)).reshape(rows, *values.shape[1:-1])[:count]
 
 
 def _blocks(pulls: NDArray[np.bool_]) -> dict[str, Indices]:

@@ -166,6 +166,7 @@ def _part(
         body=body,
         status=status[chosen],
         touches=touches,
+        loads=None if rows.loads is None else rows.loads.of(chosen),
     )
     if (shifted := _shifted(wraps, pattern, node, contacts_here, frames, chosen)).any():
         return replace(part, shifts=_shifts(part, shifted))

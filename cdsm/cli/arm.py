@@ -216,7 +216,12 @@ def view(
     with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the view, also while it starts
         robot = options.load_arm(arm, changes)
         start = None if angles is None else options.joint_coordinates(angles, robot)
-        force = options.load_at_tip(robot, load)
+        loads = options.loads_on(robot, load)
+        force = loads.pop(robot.tip_link)
+        if loads:
+            raise misuse(
+                "--load", f"acts on {' and '.join(loads)}, but the view has one at the tip."
+            )
         if force[3:].any():
             raise misuse("--load", "has a moment, but the view has forces only: FX,FY,FZ.")
         motion = options.Motion() if path is None else options.read_path(path, robot)

@@ -72,16 +72,10 @@ MinimumOption = Annotated[
 MaximumOption = Annotated[
     float, opt("Upper bound of all tensions [N], besides those of ARM.toml.", "N")
 ]
-LoadOption = Annotated[
-    str | None, opt("Force [N], moment [N m] at the tip, base axes.", "FX,FY,FZ[,MX,MY,MZ]")
-]
-MassOption = Annotated[
-    float | None, opt("Mass that hangs at the tip; adds to --load.", "KG", min=0.0)
-]
 _LOADS = "Force [N], moment [N m], base axes, at the tip or @LINK. Repeat for more links."
-LoadsOption = Annotated[list[str] | None, opt(_LOADS, "FX,FY,FZ[,MX,MY,MZ][@LINK]", "--load")]
+LoadOption = Annotated[list[str] | None, opt(_LOADS, "FX,FY,FZ[,MX,MY,MZ][@LINK]", "--load")]
 _MASSES = "Mass that hangs at the tip or @LINK; adds to --load. Repeat for more links."
-MassesOption = Annotated[list[str] | None, opt(_MASSES, "KG[@LINK]", "--mass")]
+MassOption = Annotated[list[str] | None, opt(_MASSES, "KG[@LINK]", "--mass")]
 FigureOption = Annotated[Path | None, file_opt("Figure to write.", "FILE.pdf|svg|png", "--figure")]
 JsonOption = Annotated[bool, opt("Print answer (SI) and errors as JSON.", None, "--json")]
 
@@ -115,41 +109,46 @@ def posture(arm: Path, changes: Iterable[str] | None, angles: str | None) -> cds
     return robot.at(joint_coordinates(angles, robot))
 
 
-def load_at_tip(arm: cdsm.Manipulator, load: str | None, mass: float | None = None) -> Array:
-    """Return the wrench (6,) of --load and --mass: force [N], then moment [N m], base axes."""
+def loads_on(
+    arm: cdsm.Manipulator, loads: Iterable[str] | None, masses: Iterable[str] | None = None
+) -> dict[str, Array]:
+    """Return the wrenches (6,) of --load and --mass by links, the tip among them; they add up."""
     import numpy as np
 
     from cdsm.support.validation import number_array
 
-    form = "FX,FY,FZ or FX,FY,FZ,MX,MY,MZ"
-    components = [0.0] * 6 if load is None else parse_numbers("--load", load, (3, 6), form)
-    wrench = np.zeros(6)
-    wrench[: len(components)] = number_array("--load", components, "force")
-    if mass and not arm.gravity.any():
-        raise misuse("--mass", "has no weight without gravity.")
-    wrench[:3] += number_array("--mass", mass or 0.0, "mass") * arm.gravity
-    return wrench
-
-
-def loads_on(
-    arm: cdsm.Manipulator, loads: Iterable[str] | None, masses: Iterable[str] | None
-) -> dict[str, Array]:
-    """Return the wrenches (6,) of all --load and --mass by links, the tip among them."""
-    import numpy as np
-
     wrenches = {arm.tip_link: np.zeros(6)}
-    for text in loads or ():
-        components, _, link = text.partition("@")
-        name = link or arm.tip_link
-        wrenches[name] = wrenches.get(name, np.zeros(6)) + load_at_tip(arm, components)
-    for text in masses or ():
-        number, _, link = text.partition("@")
-        (mass,) = parse_numbers("--mass", number, (1,), "KG or KG@LINK")
+    form = "FX,FY,FZ or FX,FY,FZ,MX,MY,MZ, and @LINK if not at the tip"
+    for link, text in _by_link("--load", loads, arm).items():
+        components = number_array("--load", parse_numbers("--load", text, (3, 6), form), "force")
+        wrenches.setdefault(link, np.zeros(6))[: len(components)] += components
+    for link, text in _by_link("--mass", masses, arm).items():
+        (mass,) = parse_numbers("--mass", text, (1,), "KG or KG@LINK")
         if mass < 0.0:
             raise misuse("--mass", f"{mass:g} kg given; give a mass from 0 kg on.")
-        name = link or arm.tip_link
-        wrenches[name] = wrenches.get(name, np.zeros(6)) + load_at_tip(arm, None, mass)
+        if mass and not arm.gravity.any():
+            raise misuse("--mass", "has no weight without gravity.")
+        weight = number_array("--mass", mass, "mass") * arm.gravity
+        wrenches.setdefault(link, np.zeros(6))[:3] += weight
     return wrenches
+
+
+def _by_link(option: str, texts: Iterable[str] | None, arm: cdsm.Manipulator) -> dict[str, str]:
+    """Return the text of each load by its link, which moves; the tip's is that without @LINK."""
+    from cdsm.loads import link_point
+
+    loads: dict[str, str] = {}
+    for text in texts or ():
+        value, at, name = text.partition("@")
+        link = name.strip() if at else arm.tip_link
+        try:
+            link_point(arm, link)
+        except cdsm.InvalidInput as error:
+            raise misuse(option, str(error).removeprefix("link: ")) from None
+        if link in loads:
+            raise misuse(option, f"{link} is given twice; add them up.")
+        loads[link] = value
+    return loads
 
 
 _TINY = 0.2  # largest angle [deg] that looks as if it is in radians

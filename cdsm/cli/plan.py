@@ -60,7 +60,7 @@ def plan(
 
         pose = options.posture(arm, changes, angles)
         direction_of_tip = unit_direction("direction", u)
-        wrench = options.load_at_tip(pose.arm, load, mass)
+        wrench = options.loads_on(pose.arm, load, mass)
         space = TensionSpace(pose, direction_of_tip, minimum, maximum, wrench)
         if wanted is None:
             attainable = range_within(space)
@@ -86,7 +86,7 @@ def plan(
         robot,
         u,
         _one_target(wanted, file.target),
-        *(minimum, maximum, options.load_at_tip(robot, load, mass)),
+        *(minimum, maximum, options.loads_on(robot, load, mass)),
         angles=file.angles,
         tips=file.tips,
         max_change_per_sample=max_change_per_sample,
@@ -155,6 +155,7 @@ def sweep_postures(
     Exit code 0; 3 if no entry has the status ok, or the map is empty.
     """
     from cdsm.cable import largest_share
+    from cdsm.loads import loads_of
     from cdsm.support.status import status_names
     from cdsm.support.validation import XYZ
     from cdsm.sweeps.cases import DEFAULT
@@ -180,7 +181,7 @@ def sweep_postures(
     if figure is not None:
         names = [*dict.fromkeys([*names, *(() if at_one else ("tip_position",)), shown])]
     postures = _postures(robot, angles, grid, path, plane, random)
-    wrench = options.load_at_tip(robot, load)
+    wrench = loads_of(robot, options.loads_on(robot, load))
     dataset = cdsm.sweep(
         robot,
         postures,

@@ -33,8 +33,8 @@ def show_stiffness(
     maximum: options.MaximumOption = math.inf,
     tension: options.TensionOption = None,
     pull: options.PullOption = None,
-    load: options.LoadsOption = None,
-    mass: options.MassesOption = None,
+    load: options.LoadOption = None,
+    mass: options.MassOption = None,
     direction: Annotated[str | None, opt("One more direction for it.", "AXIS|X,Y,Z")] = None,
     check: Annotated[
         bool, opt("Print a report: right, in balance, stable?", None, "--check")
@@ -206,23 +206,24 @@ def weigh(
     figure: options.FigureOption = None,
     as_json: options.JsonOption = False,
 ) -> int:
-    """Hang a weight at the tip: how far it moves, and how much more the arm holds.
+    """Hang a weight at the tip, or on a link: how far it moves, and how much more the arm holds.
 
     The motors are locked (Eq. 20), or go on as --tension or --pull say; --load and --mass are the
-    weight, in 5 steps (12 in each quarter of --cycles). With friction in the holes, small and large
-    weights measure different stiffness, and --cycles, to the load and its opposite, show the
-    hysteresis.
+    weight, in 5 steps (12 in each quarter of --cycles); it is read where it hangs. With friction in
+    the holes, small and large weights measure different stiffness, and --cycles, to the load and
+    its opposite, show the hysteresis.
 
     Exit code 0; 3 if the arm does not stay at its posture without the weight, buckles under it, or
     snaps through.
     """
     if out is not None and cycles is None:
         raise misuse("--out", "is the table of --cycles; give both.")
+    from cdsm.loads import link_point
     from cdsm.measures.holding import holding_locked
     from cdsm.support.format import coordinates, without_rounding
 
     robot = options.load_arm(arm, changes)
-    weight = _weight(robot, load, mass)
+    weights = _weights(robot, load, mass)
     K, rest = _balanced(robot, [0.0] * 6, angles, minimum, maximum, tension, pull)
     pose = K.posture
     start = rest or K.tension
@@ -234,18 +235,16 @@ def weigh(
     numbers["motors"] = "tension" if holds_tensions else "locked"
     result: WeightTest | LoadHistory
     if cycles is not None:
-        result, more, note = _cycles(pose, start, weight, cycles, steps or 12)
+        result, more, note = _cycles(pose, start, weights, cycles, steps or 12)
         write(out, result.write_loop if out and out.suffix.lower() == ".csv" else result.write)
-    elif weight[3:].any():
-        raise misuse(
-            "--load", "has a moment, but a weight is a force: FX,FY,FZ. --cycles takes moments."
-        )
     else:
         more = {}
-        result = cdsm.weight_test(pose, start, weight[:3], steps=steps or 5)
+        link, force = _one_force(weights)
+        result = cdsm.weight_test(pose, start, force, steps=steps or 5, link=link)
         if (bounds := K.distribution) is not None:
-            u = weight[:3] / math.hypot(*weight[:3])
-            held = holding_locked(pose, u, weight * 0.0, K.tension, bounds.maximum_held)
+            u = force / math.hypot(*force)
+            case = pose, u, K.applied, K.tension, bounds.maximum_held
+            held = holding_locked(*case, link_point(robot, link))
             more = {"holds": held}
         without = " without friction" if pose.arm.has_friction else ""
         note = f"at the full load{without}:\n{result.states[-1]}\n\n{held or ''}".rstrip()
@@ -261,25 +260,42 @@ def weigh(
     return answer(as_json, output, *parts, warnings=dict.fromkeys(warnings), unmet=unmet)
 
 
-def _weight(arm: cdsm.Manipulator, load: str | None, mass: float | None) -> Array:
-    """Return the wrench (6,) of a load that must not be zero."""
+def _weights(
+    arm: cdsm.Manipulator, load: list[str] | None, mass: list[str] | None
+) -> dict[str, Array]:
+    """Return the wrenches (6,) by link of a load that must not be zero."""
     if load is None and mass is None:
         raise misuse("--load", "give it or --mass: the load.")
-    weight = options.load_at_tip(arm, load, mass)
-    if not weight.any():
+    wrenches = options.loads_on(arm, load, mass)
+    weights = {link: W for link, W in wrenches.items() if W.any()}
+    if not weights:
         name = "--load" if mass is None else "--mass"
         raise cdsm.InvalidInput(name, "is zero; nothing moves, and there is nothing to measure.")
-    return weight
+    return weights
+
+
+def _one_force(weights: dict[str, Array]) -> tuple[str, Array]:
+    """Return the link and the force (3,) of one weight."""
+    if len(weights) > 1:
+        links = " and ".join(weights)
+        raise misuse("--load, --mass", f"act on {links}; one weight hangs on one link. {_CYCLES}")
+    ((link, wrench),) = weights.items()
+    if wrench[3:].any():
+        raise misuse("--load", f"has a moment, but a weight is a force: FX,FY,FZ. {_CYCLES}")
+    return link, wrench[:3]
+
+
+_CYCLES = "--cycles takes moments and several links."
 
 
 def _cycles(
     pose: cdsm.Posture,
     start: Array | Equilibrium,
-    weight: Array,
+    weights: dict[str, Array],
     cycles: int,
     steps: int,
 ) -> tuple[LoadHistory, Json, str]:
-    """Load and unload the tip; return the history, and what the last cycle loses."""
+    """Load and unload the arm; return the history, and what the last cycle loses."""
     import numpy as np
 
     from cdsm.support.format import without_rounding
@@ -287,8 +303,10 @@ def _cycles(
     up = np.arange(1, steps + 1) / steps
     hump = np.concatenate([up, up[-2::-1] if steps > 1 else [], [0.0]])
     factors = np.concatenate([hump, -hump])
-    wrenches = np.outer(np.tile(factors, cycles), weight) + 0.0  # no -0
-    history = cdsm.load_cycle(pose, start, wrenches)
+    tip = pose.arm.tip_link
+    rows = np.tile(factors, cycles)
+    wrenches = {link: np.outer(rows, W) + 0.0 for link, W in weights.items()}  # no -0
+    history = cdsm.load_cycle(pose, start, wrenches[tip] if [*wrenches] == [tip] else wrenches)
     lost = float(history.dissipated[-len(factors) :].sum())
     far = np.linalg.norm(history.displacement, axis=1)
     left = 1e6 * without_rounding(far)[-1]
@@ -324,10 +342,11 @@ def buckle(
     tension = cdsm.critical_tension(pose)
     results: dict[str, CriticalTension | CriticalLoad | Payload] = {"critical_tension": tension}
     if loaded:
-        wrench = _weight(pose.arm, load, mass)
-        results["critical_load"] = cdsm.critical_load(pose, wrench, minimum, maximum)
-        if not wrench[3:].any():
-            results["payload"] = cdsm.payload(pose, wrench[:3], minimum, maximum)
+        weights = _weights(pose.arm, load, mass)
+        results["critical_load"] = cdsm.critical_load(pose, weights, minimum, maximum)
+        if len(weights) == 1 and not any(W[3:].any() for W in weights.values()):
+            link, force = _one_force(weights)
+            results["payload"] = cdsm.payload(pose, force, minimum, maximum, link=link)
     write_picture(figure, tension.plot)
     head, numbers = header(pose, [minimum] if loaded else [])
     head = f"motors follow: they keep the posture with the least tensions\n{head}"

@@ -61,7 +61,7 @@ class _Pairs:
         self.cases = Cases(
             arm=arm,
             outputs=_outputs(problem.measures),
-            wrench=problem.loads,
+            applied=tuple(problem.loads),
             minimum=np.array([minimum]),
             maximum=problem.maximum,
             direction=np.array(self.directions).reshape(-1, 3),
@@ -106,7 +106,7 @@ class _Pairs:
     def _deflections(self) -> Array:
         """Return |C_vv f| of each held pair; the motors are locked before the load acts."""
         unloaded = replace(
-            self.cases, outputs=("translational_compliance", "margin"), wrench=np.zeros((1, 6))
+            self.cases, outputs=("translational_compliance", "margin"), applied=(np.zeros(6),)
         )
         rows = unloaded.rows(self.postures)
         force = self.problem.loads[:, :3]

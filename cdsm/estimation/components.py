@@ -9,10 +9,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.applied import LinkPoint, Loads, PointLoad
+from cdsm.applied import Loads, PointLoad
+from cdsm.dead_loads import LinkPoint, Load, point_on
 from cdsm.errors import InvalidInput
 from cdsm.estimation.balanced_loads import LoadTorques
-from cdsm.loads import Load, link_point
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.result import COMPONENTS
@@ -106,7 +106,8 @@ def components_of(
         if link not in sought:
             raise InvalidInput("points", f"{link!r} is not among links; it has {[*sought]}.")
         vector(f"points[{link!r}]", place, 3, "a point (3,) [m] in the frame of the link", "length")
-    at = tuple(link_point(arm, link, points.get(link)) for link in sought)
+    geometry = arm.definition.geometry
+    at = tuple(point_on(arm.body, geometry, link, points.get(link)) for link in sought)
     for k, point in enumerate(at):
         for other in at[:k]:
             if other.key == point.key:

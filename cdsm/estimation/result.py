@@ -11,9 +11,9 @@ from typing import Any, final
 import numpy as np
 
 from cdsm.applied import Applied, acts, texts, tip_part
+from cdsm.dead_loads import Load
 from cdsm.errors import listed
 from cdsm.estimation.components import Components
-from cdsm.loads import Load
 from cdsm.posture import Posture
 from cdsm.support.determination import Determination, chi_square_text, likely
 from cdsm.support.format import aligned, coordinates, plural, span, with_uncertainty
@@ -117,9 +117,9 @@ class TensionEstimate(Result):
 
     def _known(self) -> list[str]:
         """Return which loads are taken as known as text."""
-        if acts(tip_part(self.applied)):
-            return [f"known wrench at the tip {coordinates(tip_part(self.applied))} N, N m"]
-        return [f"known {line}" for line in texts(self.applied)]
+        at_tip = tip_part(self.applied)
+        lines = [f"wrench at the tip {coordinates(at_tip)} N, N m"] * acts(at_tip)
+        return [f"known {line}" for line in (*lines, *texts(self.posture.arm, self.applied))]
 
     def _verdict(self) -> str:
         return f"left of the balance: {chi_square_text(self.chi_square, self.freedom)}"

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from cdsm.applied import LinkPoint, Loads, PointLoad, combined
+from cdsm.applied import combined, jacobian_at, load_at
+from cdsm.dead_loads import LinkPoint
 from cdsm.friction.capstan import ChainProblem, assemble_segments, can_stick
 from cdsm.loads import LoadsLike, link_point
 from cdsm.posture import Posture
@@ -135,9 +136,9 @@ def breakaway(
         breakaway along (0, -1, 0): 0.06066 N, first at site 9 of cable5_3 (link4)
     """
     u = unit_direction("direction", direction)
-    at = None if link is None else link_point(pose.arm, link, point)
     K = stuck_stiffness(pose, tension, wrench)
-    J_v = (pose.jacobian if at is None else at.jacobian(pose))[:3]
+    at = link_point(pose.arm, link, point)
+    J_v = jacobian_at(pose, at)[:3]
     segments = pose.segments
     chains = segments.chains
     loads = np.full(segments.wrap.size, math.inf)
@@ -195,10 +196,9 @@ def _first_slip(
 
     half, T = at(load / 2.0, motion)
     force = load / 2.0 * np.append(u, np.zeros(3))
-    added = force if point is None else Loads((PointLoad(point, force),))
-    wrench = combined(K.applied, added)
+    wrench = combined(K.applied, load_at(point, force))
     none = np.zeros(chains.hole.size, dtype=np.bool_)
-    J_half = (half.jacobian if point is None else point.jacobian(half))[:3]
+    J_half = jacobian_at(half, point)[:3]
     there = assemble_segments(half, T, none, wrench, "stuck")
     motion = np.asarray(np.linalg.solve(there.joint, u @ J_half), np.float64)
     if excess(2.0 * load).max() > 0.0:

@@ -9,10 +9,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.dead_loads import Load
 from cdsm.errors import FileError, InvalidInput
 from cdsm.identification.measurement import WeightLoop
 from cdsm.identification.tip_position import TipPosition
 from cdsm.joints import require_followers
+from cdsm.loads import link_point
 from cdsm.manipulator import Manipulator
 from cdsm.support.tables import ANGLE, Columns, Row
 from cdsm.support.validation import AXES, instance
@@ -39,16 +41,17 @@ def read_loops(
       joints: the angle before the first force. A joint without a column is at 0. A column of a
       joint that mimics another one is checked.
     - ``direction``: direction of the forces, an axis such as ``-z``.
+    - Optional: ``link``, on which the forces act and which is read; an empty cell is the tip.
     - ``force [N]``: force along the direction, 0 where nothing hangs.
     - ``displacement [mm]``: reading along the direction; or ``x [mm]``, ``y [mm]`` and ``z [mm]``.
       The unit may be um or m, and the offset is arbitrary. A file of planned tests has no readings.
     - A column per cable, such as ``cable1_1 [N]``: the tension before the first force. Or
       ``minimum [N]``: the lower bound with which the tensions are distributed.
 
-    A cell of a joint, a cable, ``direction`` or ``minimum`` may be empty after the first line of a
-    test. Lines that begin with # are ignored. Columns with other names are ignored too. But a name
-    that looks like a misspelling of one of these names, or like a joint or cable that the arm does
-    not have, and one that would change the answer, such as ``mass``, are errors.
+    A cell of a joint, a cable, ``link``, ``direction`` or ``minimum`` may be empty after the first
+    line of a test. Lines that begin with # are ignored. Columns with other names are ignored too.
+    But a name that looks like a misspelling of one of these names, or like a joint or cable that
+    the arm does not have, and one that would change the answer, such as ``mass``, are errors.
 
     Args:
         path: The file.
@@ -70,7 +73,7 @@ def read_loops(
     """
     joints = instance("arm", arm, Manipulator).joint_names
     cables = arm.cables.names
-    units = {"test": _TEXT, "direction": _TEXT, "force": _FORCE, "minimum": _FORCE}
+    units = {"test": _TEXT, "direction": _TEXT, "force": _FORCE, "minimum": _FORCE, "link": _TEXT}
     units |= dict.fromkeys(("displacement", *"xyz"), _LENGTH) | dict.fromkeys(cables, _FORCE)
     units |= zip(joints, (_LENGTH if slides else ANGLE for slides in arm.slides), strict=True)
     followers = [name for name in arm.body.all_joints if name not in joints]
@@ -96,6 +99,7 @@ def read_loops(
         if direction not in AXES:
             fault = f"{direction!r} is no axis; give one of {', '.join(AXES)}"
             refuse(f"line {rows[0][0]}, column direction: {fault}")
+        link = _link(table, fixed(rows, "link"), "link", arm) if "link" in table else None
         before = [number(fixed(rows, name), name) for name in tensions]
         read = np.array([[number(row, name) for name in readings] for row in rows])
         if readings and (moved := float(np.ptp(read, axis=0).max())) > arm.length:
@@ -115,6 +119,7 @@ def read_loops(
             minimum=before[0] if tensions == ["minimum"] else bound,
             displacement_std=displacement_std,
             label=label,
+            link=link,
         )
 
     axes = [*"xyz"] if any(axis in table for axis in "xyz") else []
@@ -162,6 +167,8 @@ def read_tip_positions(
       not both in one file. A cable without a column, or with an empty cell, is loose.
     - Optional: the load at the tip, ``force [N]`` along ``direction``, an axis such as ``-z``; and
       ``mass [kg]`` that hangs there. An empty cell is no load.
+    - Optional: ``load_link``, on which the load acts, and ``link``, whose position was measured, as
+      for :class:`~cdsm.Load` without a point. An empty cell is the tip.
     - Optional: ``label``.
 
     An empty cell of a coordinate was not measured. Lines that begin with # and columns with other
@@ -188,6 +195,7 @@ def read_tip_positions(
     names = instance("arm", arm, Manipulator).cables.names
     units = {"label": _TEXT} | dict.fromkeys("xyz", _LENGTH) | dict.fromkeys(names, _LENGTH)
     units |= {"direction": _TEXT, "force": _FORCE, "mass": _MASS}
+    units |= {"link": _TEXT, "load_link": _TEXT}
     table = Columns(path, units, "positions")
     axes, cables = ([name for name in group if name in table] for group in ("xyz", names))
     if not axes or not cables:
@@ -203,8 +211,11 @@ def read_tip_positions(
     if "mass" in table and not arm.gravity.any():
         table.refuse("has a column mass, but the arm has no gravity; give force [N] and direction")
 
-    def wrench(row: Row) -> tuple[float, ...]:
-        """Return the load at the tip in a row (6,)."""
+    if "load_link" in table and not loads:
+        table.refuse("has a column load_link, but no load: add force [N] and direction, or mass")
+
+    def wrench(row: Row) -> tuple[float, ...] | tuple[Load, ...]:
+        """Return the load in a row: (6,) at the tip, or on its link."""
         force = np.zeros(6)
         if table.text(row, "force") and (newtons := table.number(row, "force")):
             direction = table.text(row, "direction")
@@ -214,7 +225,8 @@ def read_tip_positions(
             force[:3] += newtons * np.asarray(AXES[direction])
         if table.text(row, "mass"):
             force[:3] += table.number(row, "mass") * arm.gravity
-        return tuple(force.tolist())
+        link = _link(table, row, "load_link", arm)
+        return tuple(force.tolist()) if link is None else (Load(link, tuple(force[:3].tolist())),)
 
     positions = []
     for row in table.rows:
@@ -225,5 +237,18 @@ def read_tip_positions(
         fields: dict[str, Any] = {axis: read[axis] for axis in axes if axis in read}
         fields[motors] = {name: value for name, value in read.items() if name in names}
         fields["wrench"] = wrench(row)
+        fields["link"] = _link(table, row, "link", arm)
         positions.append(TipPosition(**fields, std=std, label=table.text(row, "label")))
     return tuple(positions)
+
+
+def _link(table: Columns, row: Row, column: str, arm: Manipulator) -> str | None:
+    """Return the link in a cell; None for the tip, if it is empty or there is no such column."""
+    if column not in table or not (link := table.text(row, column)):
+        return None
+    try:
+        link_point(arm, link)
+    except InvalidInput as error:
+        fault = str(error).removeprefix("link: ").rstrip(".")
+        table.refuse(f"line {row[0]}, column {column}: {fault}")
+    return link

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.applied import Applied, combined, load_at, position_at
+from cdsm.dead_loads import Load
 from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.loads import has_loads, kept_loads, kept_point, link_point, loads_of
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import equilibrium
@@ -28,7 +31,6 @@ from cdsm.support.validation import (
     unit_direction,
     vector,
     whole_number,
-    wrench_vector,
 )
 from cdsm.support.values import Array
 from cdsm.tension import Tension, distribute_tension
@@ -39,11 +41,11 @@ _SUBSTEPS = 2  # of load_cycle; fixed, so that predictions are smooth functions 
 @final
 @dataclass(frozen=True)
 class Measurement:
-    """Stiffness measured at the tip of a real arm, and the conditions of the measurement.
+    """Stiffness measured on a real arm, and the conditions of the measurement.
 
     Attributes:
         value: Stiffness along the direction [N/m]: force divided by the displacement of the tip
-            along it.
+            along it, or of the point where the force acts.
         direction: Common direction of force and displacement: an axis such as ``"z"``, kept as its
             vector, or (3,) in base axes, any length. With a ``force`` the sign matters: ``"-z"``
             hangs a weight, ``"z"`` lifts the tip.
@@ -53,10 +55,13 @@ class Measurement:
             :func:`~cdsm.distribute_tension` then balances the model at these angles.
         std: Standard deviation of the value [N/m], or a guess at it: the weight of the measurement.
         wrench: W (6,) at ``tool0`` without the measuring force, base axes: force [N], moment [N m].
+            Or loads on links, as for :func:`~cdsm.distribute_tension`.
         label: Name in reports and figures.
         force: Magnitude of the measuring force [N], added to ``wrench``. The value is then the
             secant of :func:`~cdsm.weight_test`, with motors locked at these angles and tensions.
             0 means a small force: the value is the tangent.
+        link: Link on which the force acts and of which the displacement is read; None: the tip.
+        point: Where on it (3,) [m], as for :class:`~cdsm.Load`.
 
     Raises:
         InvalidInput: A field is invalid. The error names the field and the fault.
@@ -74,9 +79,11 @@ class Measurement:
     tension: tuple[float, ...] | None = None
     minimum: float | tuple[float, ...] | None = None
     std: float = field(kw_only=True)
-    wrench: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    wrench: tuple[float, ...] | tuple[Load, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     label: str = ""
     force: float = 0.0
+    link: str | None = None
+    point: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         value = positive("value", self.value, "N/m")
@@ -104,12 +111,15 @@ class Measurement:
             unit = pose.arm.stiffness_unit()
             problem = f"the arm buckles: the smallest stiffness is {K.margin:.3g} {unit}."
             raise SingularStiffness(problem, K.critical_direction)
-        value = K.along(self.direction)
+        value = K.along(self.direction, self.link, self.point)
         u = unit_direction("direction", self.direction)
         if self.force:
-            value = weight_test(pose, K.tension, self.force * u, wrench=K.wrench).stiffness
+            where: Any = {"link": self.link, "point": self.point}
+            F = self.force * u
+            value = weight_test(pose, K.tension, F, wrench=K.applied, **where).stiffness
         if not value < 1.0 / SMALLEST:
-            problem = "the tip cannot move in its direction, so the stiffness is infinite."
+            what = self.link or "the tip"
+            problem = f"{what} cannot move in its direction, so the stiffness is infinite."
             raise SingularStiffness(problem, u)
         return np.array([value])
 
@@ -130,7 +140,7 @@ class WeightLoop:
     The arm is shaken at the posture, so that each cable has one tension along its length, and its
     motors are locked. Then the forces act one after the other, as in :func:`~cdsm.load_cycle`. A
     reading is the position of the tip along the direction, or in x, y and z, from an arbitrary
-    zero.
+    zero; with a ``link``, the forces act there, and the reading is its position.
 
     Attributes:
         direction: Direction of the forces: an axis such as ``"-z"``, kept as its vector, or (3,) in
@@ -143,8 +153,11 @@ class WeightLoop:
         tension: Cable tensions (C,) [N] before the first force. Give ``tension`` or ``minimum``.
         minimum: Lower bound of the tensions [N], one number or (C,).
             :func:`~cdsm.distribute_tension` then balances the model at these angles.
-        wrench: W (6,) at ``tool0`` without the forces, base axes: force [N], moment [N m].
+        wrench: W (6,) at ``tool0`` without the forces, base axes: force [N], moment [N m]. Or loads
+            on links, as for :func:`~cdsm.distribute_tension`.
         label: Name in reports and figures.
+        link: Link on which the forces act and that is read; None: the tip.
+        point: Where on it (3,) [m], as for :class:`~cdsm.Load`.
 
     Raises:
         InvalidInput: A field is invalid, or all forces are the same. The error names the field and
@@ -168,8 +181,10 @@ class WeightLoop:
     displacement_std: float
     tension: tuple[float, ...] | None = None
     minimum: float | tuple[float, ...] | None = None
-    wrench: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    wrench: tuple[float, ...] | tuple[Load, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     label: str = ""
+    link: str | None = None
+    point: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         forces = number_array("forces", self.forces, "force")
@@ -254,14 +269,22 @@ class WeightLoop:
         Without friction there are no paths.
         """
         F = tension.values if isinstance(tension, Tension) else tension
-        W = np.array(self.wrench) + np.pad(self.applied, ((0, 0), (0, 3)))
+        at = link_point(pose.arm, self.link, self.point)
+        before = loads_of(pose.arm, self.wrench)
+        forces = np.pad(self.applied, ((0, 0), (0, 3)))
+        loads = [combined(before, load_at(at, force)) for force in forces]
         paths: tuple[EquilibriumPath, ...] = ()
         if pose.arm.has_friction:
-            history, paths = follow_loads(pose, F, W, substeps=_SUBSTEPS, near=near)
-            moved = history.displacement
+            history, paths = follow_loads(pose, F, _rows(loads), substeps=_SUBSTEPS, near=near)
+            places = history.tip
+            if at is not None:
+                poses = [history.pose(k) for k in history.load.tolist()]
+                places = np.array([at.position(there) for there in poses])
         else:  # the history has no influence, so each load is computed once
-            loads, which = np.unique(W, axis=0, return_inverse=True)
-            moved = np.array([equilibrium(pose, F, load).displacement for load in loads])[which]
+            _, first, which = np.unique(self.forces, return_index=True, return_inverse=True)
+            rests = [equilibrium(pose, F, loads[k]).pose for k in first.tolist()]
+            places = np.array([position_at(rest, at) for rest in rests])[which]
+        moved = places - position_at(pose, at)
         return np.asarray(moved @ self.axes.T).ravel(), paths
 
     def errors(self, predicted: Array) -> tuple[Array, float]:
@@ -281,6 +304,11 @@ def tension_before(test: Measurement | WeightLoop, pose: Posture) -> Tension | A
         return test.tension
     assert test.minimum is not None
     return distribute_tension(pose, test.minimum, wrench=test.wrench)
+
+
+def _rows(loads: list[Applied]) -> ArrayLike | list[Applied]:
+    """Return loads as wrenches (n, 6) if all act at the tip alone."""
+    return loads if has_loads(loads) else np.array(loads)
 
 
 def measurement_name(i: int, label: str) -> str:
@@ -313,7 +341,8 @@ def _keep(measurement: Measurement | WeightLoop, **fields: object) -> None:
         direction = axis_vector("direction", direction)
     unit_direction("direction", direction)
     fields["direction"] = tuple(vector("direction", direction, 3, "in base axes").tolist())
-    fields["wrench"] = tuple(wrench_vector("wrench", measurement.wrench).tolist())
+    fields["wrench"] = kept_loads("wrench", measurement.wrench)
+    fields["link"], fields["point"] = kept_point(measurement.link, measurement.point)
     fields["angles"] = _row("angles", measurement.angles, "one angle [rad] per joint")
     if tension is not None:
         fields["tension"] = _row("tension", tension, "one tension [N] per cable")

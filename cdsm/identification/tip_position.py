@@ -8,13 +8,16 @@ from typing import Final, final
 
 import numpy as np
 
+from cdsm.applied import position_at
+from cdsm.dead_loads import Load
 from cdsm.errors import InvalidInput
 from cdsm.identification.measurement import positive
+from cdsm.loads import kept_loads, kept_point, link_point
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.forward_statics import forward_statics
 from cdsm.support.format import coordinates, without_rounding
-from cdsm.support.validation import NO_WRENCH, number_array, scalar, wrench_vector
+from cdsm.support.validation import NO_WRENCH, number_array, scalar
 from cdsm.support.values import Array
 
 NumbersOfCables = tuple[float, ...] | Mapping[str, float]
@@ -27,7 +30,7 @@ _FARTHEST = 10.0  # largest distance of a tip from the base, in lengths of the a
 @final
 @dataclass(frozen=True, kw_only=True)
 class TipPosition:
-    """Measured position of the tip of a real arm, and what its motors did.
+    """Measured position of the tip of a real arm, or of a link, and what its motors did.
 
     The arm comes to rest as by :func:`~cdsm.forward_statics`, from the pulls, rest lengths or
     tensions of its cables, one of the three. They are (C,), or a dict by the names of cables: a
@@ -41,8 +44,11 @@ class TipPosition:
         pull: Wire that each motor reports to have taken in from the straight arm [m].
         rest_lengths: Unstrained length of the wires that the motors have left [m].
         tension: Tensions that the motors hold [N].
-        wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
+        wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m]. Or loads on links, as
+            for :func:`~cdsm.distribute_tension`.
         label: Name in reports and figures.
+        link: Link whose position was measured; None: the tip.
+        point: Where on it (3,) [m], as for :class:`~cdsm.Load`.
 
     Raises:
         InvalidInput: A field is invalid. The error names the field and the fault.
@@ -61,8 +67,10 @@ class TipPosition:
     pull: NumbersOfCables | None = None
     rest_lengths: NumbersOfCables | None = None
     tension: NumbersOfCables | None = None
-    wrench: tuple[float, ...] = NO_WRENCH
+    wrench: tuple[float, ...] | tuple[Load, ...] = NO_WRENCH
     label: str = ""
+    link: str | None = None
+    point: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         if not self.axes:
@@ -85,7 +93,8 @@ class TipPosition:
         if not isinstance(self.label, str):
             raise InvalidInput("label", f"{self.label!r} given; a text is needed.")
         fields |= {name: _numbers(name, getattr(self, name)), "std": std}
-        fields["wrench"] = tuple(wrench_vector("wrench", self.wrench).tolist())
+        fields["wrench"] = kept_loads("wrench", self.wrench)
+        fields["link"], fields["point"] = kept_point(self.link, self.point)
         for key, kept in fields.items():
             object.__setattr__(self, key, kept)
 
@@ -119,8 +128,9 @@ class TipPosition:
         return forward_statics(arm, **motors, wrench=self.wrench, start=start).pose
 
     def tip_coordinates(self, pose: Posture) -> Array:
-        """Return the coordinates of the tip of a model that were measured."""
-        return pose.tip[["xyz".index(axis) for axis in self.axes], 3]
+        """Return the coordinates of the tip, or of a link, of a model that were measured."""
+        place = position_at(pose, link_point(pose.arm, self.link, self.point))
+        return place[["xyz".index(axis) for axis in self.axes]]
 
     def errors(self, predicted: Array) -> tuple[Array, float]:
         """Return predicted minus measured coordinates, and their standard deviation."""

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 from cdsm.applied import texts
 from cdsm.definition import refuse_terms
 from cdsm.errors import InvalidInput, listed, warn
-from cdsm.interchange.mjcf_bodies import LEAST_INERTIA, add_bodies, couple
+from cdsm.interchange.mjcf_bodies import LEAST_INERTIA, add_bodies, add_loads, couple
 from cdsm.interchange.mjcf_cables import add_path, pulley_remarks, row, side_sites
 from cdsm.manipulator import Manipulator
 from cdsm.motors import YIELDING_REMEDY, refuse_yielding
@@ -87,6 +87,7 @@ def to_mjcf(
     at the tip is ``tool0``. A new ``mjData`` and the
     keyframe ``pose`` have the joint coordinates of the posture. The model has no leads (straight
     cables before the first site), no friction in the holes, and no wrench: apply it at run time.
+    Loads that belong to the arm are actuators ``load/1``, …, which need no ``ctrl``.
     ``actuators`` is one of
 
     Of motors that move several cables, the comment at the top says which commands belong together,
@@ -205,6 +206,7 @@ def mujoco_model(
     if coupling:
         couple(root, coupling, arm.body.all_joints, step)
     controls = _cables(root, arm, K, actuators, of_cables)
+    controls += [0.0] * add_loads(root, arm)
     if K is not None:
         frame = etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="pose")
         frame.set("qpos", row([start[joint.get("name")] for joint in joints]))
@@ -267,7 +269,10 @@ def _motion(
 
 def _missing(K: Stiffness) -> Iterator[str]:
     """Yield a remark if K has a wrench, which the model lacks, and one if K is out of balance."""
-    yield from (f"load       {text}: not in the model, apply it there" for text in texts(K.applied))
+    for text in texts(K.posture.arm, K.applied):
+        own = text.startswith("load of the arm")
+        where = "an actuator without ctrl" if own else "not in the model, apply it there"
+        yield f"load       {text}: {where}"
     if (W := K.tip_wrench).any():
         load = f"{coordinates(W[:3])} N, {coordinates(W[3:])} N m"
         yield f"load       {load} is not in the model: apply it to {K.posture.arm.tip_link}"

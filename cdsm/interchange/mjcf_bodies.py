@@ -136,6 +136,27 @@ def _placed(place: Array, turn: Rotation) -> dict[str, str]:
     return {"pos": row(place), "quat": row(np.roll(turn.as_quat(), 1))}
 
 
+def add_loads(root: etree._Element, arm: Manipulator) -> int:
+    """Add an actuator for each load that belongs to the arm, and return their number.
+
+    An actuator between a site and a reference site of the world has its force and moment in the
+    axes of the latter; its bias needs no ``ctrl``.
+    """
+    if not arm.own_loads:
+        return 0
+    bodies = {body.get("name"): body for body in root.iter("body", "worldbody")}
+    size = repr(_TIP)
+    etree.SubElement(bodies[None], "site", name="load/axes", pos=row((0.0, 0.0, 0.0)), size=size)
+    for number, (at, wrench) in enumerate(arm.own_loads, start=1):
+        name = f"load/{number}"
+        body = bodies.get(at.link, bodies[None])
+        etree.SubElement(body, "site", name=name, pos=row(at.local), size=size)
+        force = {"gear": row(wrench), "gainprm": "0", "biastype": "affine", "biasprm": "1 0 0"}
+        sites = {"name": name, "site": name, "refsite": "load/axes"}
+        etree.SubElement(root.find("actuator"), "general", sites | force)
+    return len(arm.own_loads)
+
+
 def couple(
     root: etree._Element, coupling: Coupling, names: Sequence[str], time_step: float
 ) -> None:

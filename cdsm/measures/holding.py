@@ -9,6 +9,8 @@ from typing import Literal, final
 
 import numpy as np
 
+from cdsm.applied import Applied, combined, jacobian_at, load_at, scaled
+from cdsm.dead_loads import LinkPoint
 from cdsm.errors import InfeasibleTension, SingularStiffness
 from cdsm.measures.polytope import balanced
 from cdsm.posture import Posture
@@ -65,7 +67,12 @@ class Holding(Result):
 
 
 def holding_following(
-    pose: Posture, u: Array, wrench: Array, minimum: Array, maximum: Array
+    pose: Posture,
+    u: Array,
+    wrench: Applied,
+    minimum: Array,
+    maximum: Array,
+    at: LinkPoint | None = None,
 ) -> Holding | None:
     """Return what the arm holds along u while its motors re-distribute the tensions.
 
@@ -77,13 +84,14 @@ def holding_following(
         distribute_tension(pose, low, high, wrench)
     except InfeasibleTension:
         return None
-    solution = balanced(pose, u[:, None], wrench, low, high)(np.ones(1))
+    solution = balanced(pose, u[:, None], wrench, low, high, at)(np.ones(1))
     force = max(float(solution.x[0]), 0.0) if solution.ok else 0.0
     force = math.inf if solution.status is Status.UNBOUNDED else force
     load = force or 1.0
     if math.isinf(load):
-        load = _first_load(pose, low, high, wrench, u)
-    critical = critical_load(pose, load * np.append(u, np.zeros(3)), low, high, wrench=wrench)
+        load = _first_load(pose, low, high, wrench, u, at)
+    force_there = load_at(at, load * np.append(u, np.zeros(3)))
+    critical = critical_load(pose, force_there, low, high, wrench=wrench)
     if critical.limit == "buckling" and critical.factor * load < force:
         force = critical.factor * load
         joint = pose.arm.joint_names[int(abs(critical.mode).argmax())]
@@ -94,13 +102,18 @@ def holding_following(
         return _holding(pose, u, "following", force, "none", ())
     else:
         kind, place, limit = _limiting_bound(
-            pose, u, wrench, (low, high), (minimum, maximum), force
+            pose, u, wrench, (low, high), (minimum, maximum), force, at
         )
     return _holding(pose, u, "following", force, limit, (Event(kind, place, 1.0, force),))
 
 
 def holding_locked(
-    pose: Posture, u: Array, wrench: Array, tension: Array, maximum: Array
+    pose: Posture,
+    u: Array,
+    wrench: Applied,
+    tension: Array,
+    maximum: Array,
+    at: LinkPoint | None = None,
 ) -> Holding:
     """Return what the arm holds along u while its motors hold the wire at tensions F (C,) [N].
 
@@ -114,16 +127,16 @@ def holding_locked(
         event = Event("buckling", joint, 0.0, 0.0)
         return _holding(pose, u, "locked", 0.0, f"buckling, {joint} most, without it", (event,))
     try:
-        along = K.along(u)
+        along = K.tip_response(u, J_v=jacobian_at(pose, at)[:3])[0]
     except SingularStiffness:
         along = math.inf
     size = _SAG * pose.arm.length * along
     if not math.isfinite(size):
         size = max(float(tension.max(initial=0.0)), 1.0)
-    force = size * np.append(u, np.zeros(3))
+    force = load_at(at, size * np.append(u, np.zeros(3)))
 
     def model(share: float) -> LockedArm:
-        return rest.model.under(frozen(wrench + share * force))
+        return rest.model.under(combined(wrench, scaled(force, share)))
 
     watch = watched(rest.model, maximum)
     here = stage_at(model, rest.pose, rest.stop_torque, 0.0)
@@ -167,11 +180,14 @@ def _within_laws(pose: Posture, low: Array, high: Array) -> tuple[Array, Array]:
     return frozen(np.maximum(low, first)), frozen(np.minimum(high, last))
 
 
-def _first_load(pose: Posture, low: Array, high: Array, wrench: Array, u: Array) -> float:
-    """Return a force [N] along u that moves the tip by 5 % of the length, or like the tensions."""
+def _first_load(
+    pose: Posture, low: Array, high: Array, wrench: Applied, u: Array, at: LinkPoint | None
+) -> float:
+    """Return a force [N] along u that moves its point by 5 % of the length, or like tensions."""
     tension = distribute_tension(pose, low, high, wrench)
     try:
-        force = _SAG * pose.arm.length * stiffness(pose, tension).along(u)
+        K = stiffness(pose, tension)
+        force = _SAG * pose.arm.length * K.tip_response(u, J_v=jacobian_at(pose, at)[:3])[0]
     except SingularStiffness:
         force = math.inf
     return force if math.isfinite(force) else max(float(tension.values.max(initial=0.0)), 1.0)
@@ -180,10 +196,11 @@ def _first_load(pose: Posture, low: Array, high: Array, wrench: Array, u: Array)
 def _limiting_bound(
     pose: Posture,
     u: Array,
-    wrench: Array,
+    wrench: Applied,
     narrowed: tuple[Array, Array],
     bounds: tuple[Array, Array],
     force: float,
+    at: LinkPoint | None,
 ) -> tuple[Kind, str, str]:
     """Return the bound that limits the force most: a change of it by 1 % changes the force most.
 
@@ -191,13 +208,14 @@ def _limiting_bound(
     J_L y = 0 for these cables and u · J_v y = 1; then df/dF_c = (J_L y)_c of the others.
     """
     low, high = narrowed
-    load = wrench + (1.0 - _BELOW) * force * np.append(u, np.zeros(3))
+    added = load_at(at, (1.0 - _BELOW) * force * np.append(u, np.zeros(3)))
+    load = combined(wrench, added)
     F = distribute_tension(pose, low, high, load).values
     near = _AT_BOUND * max(float(F.max(initial=0.0)), 1e-300)
     below = F - low <= near
     above = high - F <= near
     free = ~(below | above)
-    rows = np.vstack([pose.length_jacobian[free], u @ pose.jacobian[:3]])
+    rows = np.vstack([pose.length_jacobian[free], u @ jacobian_at(pose, at)[:3]])
     y = np.linalg.lstsq(rows, np.append(np.zeros(int(free.sum())), 1.0))[0]
     rate = pose.length_jacobian @ y
     rate = np.where(above, np.maximum(rate, 0.0), np.where(below, np.maximum(-rate, 0.0), 0.0))

@@ -9,7 +9,10 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.applied import Applied, Loaded, jacobian_at
+from cdsm.dead_loads import LinkPoint
 from cdsm.errors import InfeasibleTension
+from cdsm.loads import LoadsLike, link_point, loads_of
 from cdsm.measures.holding import Holding, holding_following, holding_locked
 from cdsm.measures.polytope import Farthest, balanced, force_polytope
 from cdsm.motors import refuse_shared
@@ -24,7 +27,6 @@ from cdsm.support.validation import (
     checked_quantity,
     instance,
     unit_direction,
-    wrench_vector,
 )
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, bounds_at, distribute_tension
@@ -32,7 +34,7 @@ from cdsm.tension import Tension, bounds_at, distribute_tension
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Payload(Result):
+class Payload(Result, Loaded):
     """Largest admissible force at the tip; made by :func:`payload`.
 
     The motors decide it. While they *follow*, they re-distribute the tensions, and the arm keeps
@@ -50,12 +52,13 @@ class Payload(Result):
             tensions) and ``"deflection"`` (to first order; 0 if the arm is unstable without the
             force); inf for a limit that does not restrict it. 0 if no tensions balance the arm
             without the force.
-        wrench: W (6,) that always acts: force [N], then moment [N m].
+        applied: What always acts: W (6,) at the tip, or loads on links.
         minimum: Lower bounds of the tensions that hold (C,) [N].
         maximum: Upper bounds of the tensions that hold (C,) [N]; inf for none.
         tension: Tensions (C,) [N] without the force at which the motors are locked; None if there
             are none.
         problem: Why no tensions balance the arm without the force; empty if some do.
+        point: Where the force acts and the deflection is read; None: the tip.
     """
 
     _headline = "force"
@@ -64,11 +67,12 @@ class Payload(Result):
     direction: Array = field(metadata=unit("1", "axis"))
     worst: bool = field(metadata=unit("1"))
     limits: dict[str, float] = field(metadata=unit("N"))
-    wrench: Array
+    applied: Applied
     minimum: Array
     maximum: Array
     tension: Array | None
     problem: str = ""
+    point: LinkPoint | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -84,7 +88,7 @@ class Payload(Result):
         arm without the force.
         """
         bounds = self.minimum, self.maximum
-        return holding_following(self.posture, self.direction, self.wrench, *bounds)
+        return holding_following(self.posture, self.direction, self.applied, *bounds, self.point)
 
     @quantity("1")
     def locked(self) -> Holding | None:
@@ -96,8 +100,8 @@ class Payload(Result):
         """
         if self.tension is None:
             return None
-        at = self.posture, self.direction, self.wrench
-        return holding_locked(*at, self.tension, self.maximum)
+        case = self.posture, self.direction, self.applied
+        return holding_locked(*case, self.tension, self.maximum, self.point)
 
     @quantity("N")
     def force(self) -> float:
@@ -115,7 +119,8 @@ class Payload(Result):
         along = coordinates(np.round(self.direction, 3) + 0.0, ".3g")
         which = "worst direction" if self.worst else "direction"
         cases = [str(case) for case in (self.following, self.locked) if case is not None]
-        lines = [*self.warnings, f"{which} {along}", *cases]
+        where = f", force on {self.point.link}" if self.point else ""
+        lines = [*self.warnings, f"{which} {along}{where}", *cases]
         if math.isfinite(self.limits["deflection"]) and not self.problem:
             allowed = f"{self.limits['deflection']:.4g} N"
             lines.append(f"deflection allows {allowed} with locked motors, to first order")
@@ -127,11 +132,13 @@ def payload(
     direction: Direction | None = None,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
-    wrench: ArrayLike = NO_WRENCH,
+    wrench: LoadsLike = NO_WRENCH,
     *,
     deflection: float = math.inf,
     worst_friction: bool = False,
     tension: Tension | ArrayLike | None = None,
+    link: str | None = None,
+    point: ArrayLike | None = None,
 ) -> Payload:
     """Compute the largest admissible force f along u at the tip, added to the wrench W.
 
@@ -153,11 +160,14 @@ def payload(
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,); finite if the worst
             direction is wanted.
-        wrench: W (6,) at ``tool0`` in base axes that always acts: force [N], then moment [N m].
+        wrench: W (6,) at ``tool0`` in base axes that always acts: force [N], then moment [N m]. Or
+            loads on links, as for :func:`~cdsm.distribute_tension`.
         deflection: Largest allowed displacement of the tip [m]; inf for no limit.
         worst_friction: Narrow the bounds for friction, as :func:`~cdsm.distribute_tension` does.
         tension: F (C,) [N] at which the motors of :attr:`Payload.locked` are locked. Tensions that
             do not balance the arm move it first. Default: the least ones without the force.
+        link: Link on which the force acts and of which the deflection is read; None: the tip.
+        point: Where on it (3,) [m], as for :class:`~cdsm.Load`.
 
     Raises:
         InvalidInput: An argument has the wrong shape or range; or a cable has no upper bound, but
@@ -180,12 +190,13 @@ def payload(
     remedy = "weight_test and equilibrium say what it bears with locked motors."
     refuse_shared(pose.arm.motors, "payload", remedy)
     allowed = checked_quantity("deflection", deflection, "length", infinite=True)
-    W = wrench_vector("wrench", wrench)
+    W = loads_of(pose.arm, wrench)
+    at = link_point(pose.arm, link, point)
     bounds = bounds_at(pose, minimum, maximum, worst_friction)
     low = bounds.minimum_held
     high = bounds.maximum_held
     locked = None if tension is None else checked_tension(pose, tension, None)[0]
-    case: Any = {"posture": pose, "wrench": W, "minimum": low, "maximum": high}
+    case: Any = {"posture": pose, "applied": W, "minimum": low, "maximum": high, "point": at}
     try:
         least = distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
     except InfeasibleTension as error:
@@ -197,18 +208,22 @@ def payload(
         return Payload(direction=u, worst=False, limits=none, **case, **why)
     case["tension"] = least.values if locked is None else locked
     K = stiffness(pose, least)
-    C = K.compliance[:3, :3] if K.is_stable else np.zeros((3, 3))
+    C = np.zeros((3, 3))
+    if K.is_stable:
+        J_v = jacobian_at(pose, at)[:3]
+        C = K.compliance[:3, :3] if at is None else J_v @ K.joint_compliance() @ J_v.T
 
     def limits(u: Array) -> dict[str, float]:
         yields = float(np.linalg.norm(C @ u))
         by_deflection = allowed / yields if yields > 0.0 else math.inf
-        by_tension = largest_force(balanced(pose, u[:, None], W, low, high))
+        by_tension = largest_force(balanced(pose, u[:, None], W, low, high, at))
         return {"tension": by_tension, "deflection": by_deflection if K.is_stable else 0.0}
 
     if direction is not None:
         u = unit_direction("direction", direction)
         return Payload(direction=frozen(u), worst=False, limits=limits(u), **case)
-    polytope = force_polytope(pose, minimum, maximum, W, worst_friction=worst_friction)
+    options: Any = {"worst_friction": worst_friction, "link": link, "point": point}
+    polytope = force_polytope(pose, minimum, maximum, W, **options)
     softest = np.linalg.svd(C)[2][0]
     candidates = [(u, limits(u)) for u in (polytope.worst_direction, softest, -softest)]
     u, smallest = min(candidates, key=lambda candidate: sorted(candidate[1].values()))

@@ -15,14 +15,16 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.applied import required_torque
+from cdsm.applied import Applied, Loaded, jacobian_at, required_torque
+from cdsm.dead_loads import LinkPoint
 from cdsm.errors import CdsmError, InvalidInput, solver_failed
+from cdsm.loads import LoadsLike, link_point, loads_of
 from cdsm.motors import refuse_shared
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.support.format import coordinates, plural
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import NO_WRENCH, instance, wrench_vector
+from cdsm.support.validation import NO_WRENCH, instance
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import bounds_at, distribute_tension
 from cdsm.tension.solvers import Solution, maximise
@@ -35,15 +37,15 @@ _OUTSIDE = 1e-8  # smaller distances from a hull, relative to its size, count as
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class ForcePolytope(Result, Plotted):
+class ForcePolytope(Result, Plotted, Loaded):
     """All forces at the tip that an arm can balance; made by :func:`force_polytope`.
 
-    The forces f (3,) [N] in base axes act at the tip besides ``wrench``. The polytope is the set of
-    all f with ``normals`` @ f ≤ ``offsets``.
+    The forces f (3,) [N] in base axes act at the tip, or ``point``, besides what is ``applied``.
+    The polytope is the set of all f with ``normals`` @ f ≤ ``offsets``.
 
     Attributes:
         posture: The posture.
-        wrench: W (6,) that always acts: force [N], then moment [N m], base axes.
+        applied: What always acts: W (6,) at the tip, or loads on links.
         minimum: Lower bounds of the tensions (C,) [N].
         maximum: Upper bounds of the tensions (C,) [N].
         vertices: Corners (n, 3) [N].
@@ -53,13 +55,14 @@ class ForcePolytope(Result, Plotted):
         offsets: Distance of each facet from the force zero (n,) [N]; negative if zero is outside.
         unbounded: Unit directions (n, 3) in which the tip cannot move, as many as there are; the
             links balance any force along them, and ``vertices`` have no component along them.
+        point: Where the forces act; None: the tip.
     """
 
     _headline = "radius"
     _figure = "plot_force_polytope"
 
     posture: Posture
-    wrench: Array = field(metadata=unit("N and N m", "component"))
+    applied: Applied
     minimum: Array = field(metadata=unit("N", "cable"))
     maximum: Array = field(metadata=unit("N", "cable"))
     vertices: Array = field(metadata=unit("N", "vertex", "axis"))
@@ -67,6 +70,7 @@ class ForcePolytope(Result, Plotted):
     normals: Array = field(metadata=unit("1", "facet", "axis"))
     offsets: Array = field(metadata=unit("N", "facet"))
     unbounded: Array = field(metadata=unit("1", "immobile", "axis"))
+    point: LinkPoint | None = None
 
     @quantity("N")
     def radius(self) -> float:
@@ -93,16 +97,20 @@ class ForcePolytope(Result, Plotted):
     def __str__(self) -> str:
         corners = plural(len(self.vertices), "corner")
         direction = coordinates(self.worst_direction, ".3g")
-        return f"{corners}; holds {self.radius:.4g} N in any direction, least along {direction}"
+        where = f" on {self.point.link}" if self.point else ""
+        holds = f"holds {self.radius:.4g} N{where} in any direction"
+        return f"{corners}; {holds}, least along {direction}"
 
 
 def force_polytope(
     pose: Posture,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
-    wrench: ArrayLike = NO_WRENCH,
+    wrench: LoadsLike = NO_WRENCH,
     *,
     worst_friction: bool = False,
+    link: str | None = None,
+    point: ArrayLike | None = None,
 ) -> ForcePolytope:
     """Compute all forces f at the tip that tensions within the bounds balance, besides W (Eq. 13).
 
@@ -112,8 +120,11 @@ def force_polytope(
         pose: The posture.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,); finite.
-        wrench: W (6,) at ``tool0`` in base axes that always acts: force [N], then moment [N m].
+        wrench: W (6,) at ``tool0`` in base axes that always acts: force [N], then moment [N m]. Or
+            loads on links, as for :func:`~cdsm.distribute_tension`.
         worst_friction: Narrow the bounds for friction, as :func:`~cdsm.distribute_tension` does.
+        link: Link on which the forces act; None: at the tip.
+        point: Where on it (3,) [m], as for :class:`~cdsm.Load`.
 
     Raises:
         InvalidInput: An argument has the wrong shape, or a cable has no upper bound, so that the
@@ -134,11 +145,12 @@ def force_polytope(
     bounds = bounds_at(pose, minimum, maximum, worst_friction)
     low = bounds.minimum_held
     high = bounds.maximum_held
-    W = wrench_vector("wrench", wrench)
+    W = loads_of(pose.arm, wrench)
+    at = link_point(pose.arm, link, point)
     if not np.isfinite(high).all():
         cable = pose.arm.cables[int(np.isinf(high).argmax())].name
         raise InvalidInput("maximum", f"{cable} has none; give a finite one [N].")
-    polytope = polytope_of(pose, W, low, high)
+    polytope = polytope_of(pose, W, low, high, at)
     if polytope is None:
         distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
         raise CdsmError(
@@ -148,22 +160,24 @@ def force_polytope(
     return polytope
 
 
-def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForcePolytope | None:
-    """Compute the polytope of all forces that a posture balances; None if there are none.
+def polytope_of(
+    pose: Posture, wrench: Applied, low: Array, high: Array, at: LinkPoint | None = None
+) -> ForcePolytope | None:
+    """Compute the polytope of all forces at a point that a posture balances; None: there are none.
 
     Convex hull method (Lassez and Lassez, 1992; for robots Skuric, Padois and Daney, RA-L 2022) in
     the directions in which the tip moves: take the hull of the known corners, find the farthest
     point along the normal of each facet, and repeat until no point is outside.
     """
-    axes, size, _ = np.linalg.svd(pose.jacobian[:3])
+    axes, size, _ = np.linalg.svd(jacobian_at(pose, at)[:3])
     moved = int((size > _NO_MOTION * pose.arm.length).sum())
     basis = axes[:, :moved]
     unbounded = axes[:, moved:].T
-    farthest = balanced(pose, basis, wrench, low, high)
+    farthest = balanced(pose, basis, wrench, low, high, at)
     some = farthest(np.zeros(moved))
     if not some.ok:
         return None
-    varied, fixed = _split_forces(pose, basis)
+    varied, fixed = _split_forces(pose, basis, at)
     constant = fixed.T @ some.x
     constant[abs(constant) <= _OUTSIDE * high.max()] = 0.0
     k = varied.shape[1]
@@ -194,7 +208,7 @@ def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForceP
     offsets = (normals @ points.T).max(axis=1, initial=-math.inf)
     return ForcePolytope(
         posture=pose,
-        wrench=wrench,
+        applied=wrench,
         minimum=low,
         maximum=high,
         vertices=frozen((points[corners] @ varied.T + fixed @ constant) @ basis.T),
@@ -202,10 +216,11 @@ def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForceP
         normals=frozen(np.vstack([normals @ varied.T, fixed.T, -fixed.T]) @ basis.T),
         offsets=frozen(np.concatenate([offsets, constant, 0.0 - constant])),
         unbounded=frozen(unbounded),
+        point=at,
     )
 
 
-def _split_forces(pose: Posture, U: Array) -> tuple[Array, Array]:
+def _split_forces(pose: Posture, U: Array, at: LinkPoint | None) -> tuple[Array, Array]:
     """Split the forces x (k,) along U (3, k) by whether changes of the tensions can balance them.
 
     Returns orthonormal columns x with J_Lᵀ F = J_vᵀ U x for some F, and the others. An arm with
@@ -214,7 +229,7 @@ def _split_forces(pose: Posture, U: Array) -> tuple[Array, Array]:
     count = U.shape[1]
     arms, size, _ = np.linalg.svd(pose.length_jacobian.T, full_matrices=False)
     arms = arms[:, size > _NO_MOTION * size.max(initial=0.0)]
-    torque = pose.jacobian[:3].T @ U
+    torque = jacobian_at(pose, at)[:3].T @ U
     size, axes = np.linalg.svd(torque - arms @ (arms.T @ torque))[1:]
     fixed = int((size > _NO_MOTION * pose.arm.length).sum())
     if not fixed:
@@ -250,14 +265,21 @@ The status is UNBOUNDED if nothing bounds a · x, and INFEASIBLE if no force is 
 """
 
 
-def balanced(pose: Posture, U: Array, wrench: Array, low: Array, high: Array) -> Farthest:
+def balanced(
+    pose: Posture,
+    U: Array,
+    wrench: Applied,
+    low: Array,
+    high: Array,
+    at: LinkPoint | None = None,
+) -> Farthest:
     """Return the function that maximises over the forces along U that a posture balances.
 
-    ``low`` and ``high`` (C,) [N] are the bounds of the tensions, ``wrench`` is W (6,). Forces that
-    are rounding are zero if no change of the tensions varies them. The function raises CdsmError if
-    its linear program fails.
+    ``low`` and ``high`` (C,) [N] are the bounds of the tensions, ``wrench`` is what always acts.
+    The forces act at a point of a link, or at the tip. Those that are rounding are zero if no
+    change of the tensions varies them. The function raises CdsmError if its linear program fails.
     """
-    A = np.column_stack([pose.length_jacobian.T, -pose.jacobian[:3].T @ U])
+    A = np.column_stack([pose.length_jacobian.T, -jacobian_at(pose, at)[:3].T @ U])
     lever = abs(A).max(axis=1)
     lever[lever == 0.0] = 1.0
     A /= lever[:, None]
@@ -270,7 +292,7 @@ def balanced(pose: Posture, U: Array, wrench: Array, low: Array, high: Array) ->
     A[:, count:] /= scale
     force = float((high if np.isfinite(high).all() else np.append(low, abs(b))).max()) or 1.0
     bounds = np.append(low / force, -free), np.append(high / force, free)
-    rounding = 0.0 if _split_forces(pose, U)[0].size else _OUTSIDE * force
+    rounding = 0.0 if _split_forces(pose, U, at)[0].size else _OUTSIDE * force
 
     def farthest(along: Array) -> Solution:
         cost = np.append(np.zeros(count), along / scale)

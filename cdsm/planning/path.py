@@ -8,13 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.batch.distribution import RowsOfLoads, check_load_rows
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.kinematics import inverse_kinematics
 from cdsm.limits import UNCHECKED
 from cdsm.manipulator import Manipulator
 from cdsm.planning.goal import Goal
 from cdsm.planning.path_plan import InfeasibleSample, PathPlan
-from cdsm.planning.plan import achieved, checked_targets, per_sample
+from cdsm.planning.plan import achieved, checked_targets
 from cdsm.planning.tension_space import TensionSpace
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
@@ -38,7 +39,7 @@ def plan_path(
     target: ArrayLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
-    wrench: ArrayLike = NO_WRENCH,
+    wrench: RowsOfLoads = NO_WRENCH,
     *,
     angles: ArrayLike | None = None,
     tips: ArrayLike | None = None,
@@ -65,6 +66,7 @@ def plan_path(
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,); inf for no bound.
         wrench: W at ``tool0`` in base axes, (6,) or one per sample (S, 6): force [N], moment [N m].
+            Or loads on links: a dict of such wrenches by link, or a list of :class:`~cdsm.Load`.
         angles: The path as joint angles (S, nv) [rad]. Give either ``angles`` or ``tips``.
         tips: The path as tip positions (S, 3) [m]. :func:`~cdsm.inverse_kinematics` finds the joint
             angles of each sample that are nearest to the angles of the sample before.
@@ -89,7 +91,7 @@ def plan_path(
         raise InvalidInput("guess", "given with angles=, which need none; drop it, or give tips=.")
     directions = unit_directions("direction", direction)
     targets = checked_targets(target, directions.shape[:-1], len(path))
-    loads = per_sample("wrench", wrench, (6,), len(path))
+    acting = check_load_rows(arm, wrench, len(path))
     limit = checked_change("max_change_per_sample", arm, max_change_per_sample)
     checked_bounds(arm, minimum, maximum)  # check now, not at the first feasible posture
 
@@ -102,12 +104,13 @@ def plan_path(
             if tips is not None:
                 q = _angles(arm, q, start)
                 start = q
-            space = TensionSpace(arm.at(q), directions, minimum, maximum, loads[i])
+            load = acting.case(i)
+            space = TensionSpace(arm.at(q), directions, minimum, maximum, load)
             goal = Goal(space, targets[i].reshape(-1))
             last = max(planned, default=i)
             before = planned[last].tension if planned else None
             F = _plan(goal, before, (i - last) * limit if planned else limit, i - last)
-            planned[i] = stiffness(space.pose, F, loads[i])
+            planned[i] = stiffness(space.pose, F, load)
         except _Infeasible as cause:
             infeasible.append(InfeasibleSample(i, cause.status, cause.reason))
         except CdsmError as error:

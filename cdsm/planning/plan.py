@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
+from cdsm.loads import LoadsLike
 from cdsm.planning.goal import REACHED, Goal
 from cdsm.planning.tension_space import TensionSpace
 from cdsm.posture import Posture
@@ -121,7 +122,7 @@ def plan_stiffness(
     target: ArrayLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = np.inf,
-    wrench: ArrayLike = NO_WRENCH,
+    wrench: LoadsLike = NO_WRENCH,
     *,
     at_least: bool = False,
 ) -> StiffnessPlan:
@@ -146,7 +147,8 @@ def plan_stiffness(
         target: The stiffness [N/m] along u, or one per direction (n,).
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,); inf for no bound.
-        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]. Or loads on links,
+            as for :func:`~cdsm.distribute_tension`.
         at_least: Whether the arm may be stiffer than the target.
 
     Raises:

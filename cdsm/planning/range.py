@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
+from cdsm.loads import LoadsLike
 from cdsm.planning.tension_space import TensionSpace
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
@@ -110,7 +111,7 @@ def stiffness_range(
     direction: Direction,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = np.inf,
-    wrench: ArrayLike = NO_WRENCH,
+    wrench: LoadsLike = NO_WRENCH,
     *,
     starts: int = STARTS,
 ) -> StiffnessRange:
@@ -130,7 +131,8 @@ def stiffness_range(
         direction: u: an axis such as ``"z"``, or (3,) in base axes, any length.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,); inf for no bound.
-        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]. Or loads on links,
+            as for :func:`~cdsm.distribute_tension`.
         starts: Number of random directions in which corners are sought, 1 to 1000.
 
     Raises:

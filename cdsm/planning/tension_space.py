@@ -23,11 +23,12 @@ from scipy.optimize import brentq, minimize
 from cdsm import readings
 from cdsm.applied import required_torque
 from cdsm.errors import ElasticityRangeError, InfeasibleTension, SingularStiffness
+from cdsm.loads import LoadsLike, loads_of
 from cdsm.motors import YIELDING_REMEDY, refuse_shared, refuse_yielding
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.verdict import describe_buckling
-from cdsm.support.validation import SMALLEST, instance, wrench_vector
+from cdsm.support.validation import SMALLEST, instance
 from cdsm.support.values import Array, frozen, total
 from cdsm.tension import (
     Tension,
@@ -83,7 +84,7 @@ class TensionSpace:
         directions: Array,
         minimum: ArrayLike,
         maximum: ArrayLike,
-        wrench: ArrayLike,
+        wrench: LoadsLike,
     ) -> None:
         self.pose = instance("pose", pose, Posture)
         refuse_shared(pose.arm.motors, "plan")
@@ -103,7 +104,7 @@ class TensionSpace:
         self._size = max(float(K.magnitudes.diagonal().min()), SMALLEST)
         constant = [matrix for name, matrix in K.terms.items() if name not in CABLE_TERMS]
         self.constant_stiffness = total(constant)
-        torque = required_torque(pose, self.least.wrench)
+        torque = required_torque(pose, self.least.applied)
         self._balance = nondimensional(J, torque, low, high, pose.arm.length)
         _, sizes, basis = np.linalg.svd(J.T)
         rank = int((sizes > _RANK_TOLERANCE * sizes.max(initial=0.0)).sum())
@@ -263,7 +264,7 @@ class TensionSpace:
             optima = [self.search(F, goal, bounds=self.capped, stable=False) for F in starts]
             best = max([*points, *(F for F in optima if F is not None)], key=smallest)
         if smallest(best) <= 0.0:
-            K = stiffness(self.pose, best, self.least.wrench)
+            K = stiffness(self.pose, best, self.least.applied)
             raise unstable(K, "admissible tensions", self.bounds)
         return best
 
@@ -353,7 +354,7 @@ def unstable(K: Stiffness, tried: str, bounds: TensionLimits | None = None) -> S
 
 
 def _least_tension_within_laws(
-    pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: ArrayLike
+    pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: LoadsLike
 ) -> Tension:
     """Distribute the least tensions within the bounds and the domains of the laws.
 
@@ -361,7 +362,7 @@ def _least_tension_within_laws(
     if none of those that do are within the domains.
     """
     bounds = bounds_at(pose, minimum, maximum, within_laws=True)
-    load = wrench_vector("wrench", wrench)
+    load = loads_of(pose.arm, wrench)
     if (bounds.minimum_held <= bounds.maximum_held).all():
         with suppress(InfeasibleTension):
             return least_tension(pose, bounds, load)

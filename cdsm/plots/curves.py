@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
-from cdsm.applied import Applied, as_loads, tip_only
+from cdsm.applied import Applied
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.planning.sensitivity import Saturation, saturation
 from cdsm.plots import style
@@ -153,8 +153,8 @@ def plot_stiffness_over_tension(
     style.name_lines(panel, float(x[last] if len(x) > 1 else panel.get_xlim()[1]), ends)
     panel.set(xlabel="least tension of all cables [N]", ylabel=f"stiffness along {name} [N/mm]")
     if np.isnan(along[last + 1 :]).any():
-        bounded = bool(np.isfinite(maximum).any()) or bool(as_loads(wrench).on_links)
-        buckles = math.inf if bounded else critical_tension(pose, tip_only(wrench)).minimum
+        bounded = bool(np.isfinite(maximum).any())
+        buckles = math.inf if bounded else critical_tension(pose, wrench).minimum
         ends_here = _shade_unstable(panel, float(x[last]), buckles)
         question = f"does more tension make it stiffer? It {ends_here}"
     else:

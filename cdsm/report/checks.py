@@ -12,7 +12,7 @@ from scipy.differentiate import jacobian
 from scipy.linalg import null_space
 from scipy.optimize import nnls
 
-from cdsm.applied import as_loads, without_cables
+from cdsm.applied import without_cables
 from cdsm.batch.evaluation import evaluate
 from cdsm.batch.rows import without_kernel
 from cdsm.definition import Term
@@ -137,16 +137,13 @@ def _batch_comparison(K: Stiffness, names: list[str], matrices: Array, most: flo
     """Compare the terms of K and K_θ (n, nv, nv) with those of :func:`cdsm.evaluate`."""
     arm = K.posture.arm
     unit = K.posture.arm.levers
-    if elsewhere := as_loads(K.applied).on_links:
-        links = listed([load.at.link for load in elsewhere])
-        return _compare("batch", matrices, matrices, 0.0, most, f"no kernel for loads on {links}")
     if lacking := without_kernel(arm):
         return _compare("batch", matrices, matrices, 0.0, most, f"no kernel for {listed(lacking)}")
     slack = (K.tension == 0.0) & (K.cable_stiffness == 0.0)
     if slack.any():  # in an equilibrium, slack cables give nothing
         arm = arm.with_forced(slack)
     q = K.posture.q[None]
-    batch = evaluate(arm, q, K.tension, K.wrench, names, check_limits=False)
+    batch = evaluate(arm, q, K.tension, K.applied, names, check_limits=False)
     values = np.array([batch[name][0] for name in names]) * unit[:, None] * unit
     return _compare("batch", matrices, values, 0.0, most, "")
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cdsm.applied import as_loads
+from cdsm.applied import all_loads
 from cdsm.errors import CdsmError, SingularStiffness, listed
 from cdsm.friction.stick import breakaway
 from cdsm.report import checks
@@ -85,8 +85,8 @@ def _notes(report: Report) -> Iterator[str]:
         yield f"the cables have friction; this K is frictionless, as after shaking. {_stuck(K)}"
     if reason := next(check.reason for check in report.comparisons if check.name == "batch"):
         yield f"not compared with cdsm.evaluate: {reason}."
-    if any(load.wrench[3:].any() for load in as_loads(K.applied).loads):
-        yield "with a moment at the tip K_θ is not symmetric: its symmetric part decides stability."
+    if any(load.wrench[3:].any() for load in all_loads(arm, K.applied).loads):
+        yield "with a moment K_θ is not symmetric: its symmetric part decides stability."
     yield from _of_limits(K)
     unit = K.posture.arm.levers
     for matrix, full, what in (

@@ -6,7 +6,7 @@ Tension usually softens an arm (active part of Eq. 16). See :func:`~cdsm.equilib
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Literal, final
@@ -14,14 +14,17 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.applied import Applied, Loaded, acts, combined, scaled, tip_only, tip_part
 from cdsm.batch.evaluation import evaluate
+from cdsm.batch.rows import AppliedRows
 from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput, warn
 from cdsm.geometry.beams import buckling_doubt
+from cdsm.loads import LoadsLike, loads_of
 from cdsm.motors import refuse_shared
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import NO_WRENCH, bound, checked_quantity, instance, wrench_vector
+from cdsm.support.validation import NO_WRENCH, bound, checked_quantity, instance
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import distribute_tension
 
@@ -37,11 +40,11 @@ Limit = Literal["buckling", "infeasible", "elasticity", "none"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class _Critical(Result, Plotted):
+class _Critical(Result, Plotted, Loaded):
     """Posture and load of a result, and K_θ where the arm buckles."""
 
     posture: Posture
-    wrench: Array = field(metadata=unit("N and N m", "component"))
+    applied: Applied
     stiffness: Stiffness
 
     @quantity("1", "joint")
@@ -75,7 +78,7 @@ class CriticalTension(_Critical):
 
     Attributes:
         posture: The fixed posture.
-        wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
+        applied: What acts: W (6,) at the tip, or loads on links.
         minimum: Lower bound of tension [N] at which the arm buckles: the end of the first range in
             ``stable``; inf if that is the end of ``examined``, its low end if no range is stable.
         stiffness: K_θ at ``minimum``; if the arm does not buckle, at the bound with the smallest of
@@ -118,8 +121,8 @@ class CriticalLoad(_Critical):
 
     Attributes:
         posture: The fixed posture.
-        wrench: Constant wrench (6,) that acts in addition: force [N], then moment [N m].
-        load: The wrench (6,) that is multiplied by the factor.
+        applied: What acts in addition: W (6,) at the tip, or loads on links.
+        multiplied: What is multiplied by the factor: a wrench (6,) at the tip, or loads on links.
         factor: Largest factor [-] up to which the arm is balanced and stable; inf: half a million.
         limit: What ends it: ``"buckling"``, ``"infeasible"``, ``"elasticity"`` or ``"none"``.
         stiffness: K_θ at ``factor``, or at half a million. ``mode`` and ``tension`` belong to it.
@@ -131,11 +134,21 @@ class CriticalLoad(_Critical):
     _rows = "factors"
     _figure = "plot_critical_load"
 
-    load: Array = field(metadata=unit("N and N m", "component"))
+    multiplied: Applied
     factor: float = field(metadata=unit("1"))
     limit: Limit = field(metadata=unit("1"))
     factors: Array = field(metadata=unit("1", "factors"))
     margins: Array = field(metadata=unit("joint stiffness", "factors"))
+
+    @property
+    def load(self) -> Array:
+        """The wrench (6,) that is multiplied; InvalidInput if loads act on other links."""
+        return tip_only(self.multiplied)
+
+    @quantity("N and N m", "component", name="load")
+    def tip_load(self) -> Array:
+        """W (6,) of what is multiplied at ``tool0``, base axes: force [N], then moment [N m]."""
+        return tip_part(self.multiplied)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -155,7 +168,7 @@ class CriticalLoad(_Critical):
 
 
 def critical_tension(
-    pose: Posture, wrench: ArrayLike = NO_WRENCH, *, up_to: float = 1e6
+    pose: Posture, wrench: LoadsLike = NO_WRENCH, *, up_to: float = 1e6
 ) -> CriticalTension:
     """Compute the lower bound F_min [N] of tension at which K_θ stops being positive definite.
 
@@ -165,7 +178,8 @@ def critical_tension(
 
     Args:
         pose: The posture, which stays fixed.
-        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]. Or loads on links,
+            as for :func:`~cdsm.distribute_tension`.
         up_to: Largest lower bound [N] of the scan.
 
     Raises:
@@ -185,7 +199,7 @@ def critical_tension(
 
     arm = instance("pose", pose, Posture).arm
     refuse_shared(arm.motors, "critical_tension", _LOCKED)
-    W = wrench_vector("wrench", wrench)
+    W = loads_of(arm, wrench)
     if arm.is_serpentine and (doubt := buckling_doubt(arm.geometry.joints)):
         warn(doubt)
 
@@ -201,7 +215,7 @@ def critical_tension(
     first = max(low, _LOWEST if high > _LOWEST else _LOWEST * high)
     scan = np.geomspace(first, high, SAMPLES - 1) if high > low else np.zeros(0)
     bounds = np.unique([low, *scan])
-    margins = _margins(pose, bounds[:, None], math.inf, W)
+    margins = _margins(pose, bounds[:, None], math.inf, [W])
     n = int(np.append(np.isfinite(margins), False).argmin())  # bounds that balance the arm
     if n < bounds.size:
         balances = ("none", "buckling")
@@ -220,7 +234,7 @@ def critical_tension(
     where = minimum if minimum < math.inf else float(bounds[margins.argmin()])
     return CriticalTension(
         posture=pose,
-        wrench=W,
+        applied=W,
         minimum=minimum,
         stiffness=at(where),
         stable=ranges,
@@ -232,11 +246,11 @@ def critical_tension(
 
 def critical_load(
     pose: Posture,
-    load: ArrayLike,
+    load: LoadsLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
     *,
-    wrench: ArrayLike = NO_WRENCH,
+    wrench: LoadsLike = NO_WRENCH,
 ) -> CriticalLoad:
     """Compute the factor λ up to which an arm at a fixed posture is stable under λ load + wrench.
 
@@ -244,10 +258,11 @@ def critical_load(
 
     Args:
         pose: The posture, which stays fixed. Tensions are distributed again for every load.
-        load: Wrench (6,) at ``tool0`` in base axes: force [N], then moment [N m]; not zero.
+        load: Wrench (6,) at ``tool0`` in base axes: force [N], then moment [N m]; not zero. Or
+            loads on links, as for :func:`~cdsm.distribute_tension`.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,).
-        wrench: Constant wrench (6,) at ``tool0`` that always acts, such as the weight of a tool.
+        wrench: What always acts, such as the weight of a tool, given alike.
 
     Raises:
         InvalidInput: ``load`` is zero; or ``load``, ``wrench`` or a bound is invalid.
@@ -262,16 +277,19 @@ def critical_load(
     """
     count = len(instance("pose", pose, Posture).arm.cables)
     refuse_shared(pose.arm.motors, "critical_load", _LOCKED)
-    multiplied = wrench_vector("load", load)
-    always = wrench_vector("wrench", wrench)
+    multiplied = loads_of(pose.arm, load, "load")
+    always = loads_of(pose.arm, wrench)
     low = bound("minimum", minimum, count)
     high = bound("maximum", maximum, count)
-    if not multiplied.any():
+    if not acts(multiplied):
         raise InvalidInput("load", "is zero, and so is any multiple of it; give a load.")
+
+    def under(factor: float) -> Applied:
+        return combined(always, scaled(multiplied, factor))
 
     @cache
     def at(factor: float) -> Stiffness:
-        return stiffness(pose, distribute_tension(pose, low, high, always + factor * multiplied))
+        return stiffness(pose, distribute_tension(pose, low, high, under(factor)))
 
     at(0.0)  # raises the reason if no tensions balance the arm
     end = 1e-3
@@ -285,7 +303,7 @@ def critical_load(
         factor = math.inf
         last = end if end < _LARGEST else _SHOWN
         factors = np.linspace(0.0, last, SAMPLES)
-        margins = _margins(pose, low, high, always + factors[:, None] * multiplied)
+        margins = _margins(pose, low, high, [under(x) for x in factors.tolist()])
     if limit == "none" and end < _LARGEST:  # the doubling may have stepped over the first failure
         n = int(np.append(margins[:-1] > 0.0, False).argmin())
         factor, beyond = _bisect(lambda x: _failure(at, x) == "none", *factors[n - 1 : n + 1])
@@ -295,9 +313,9 @@ def critical_load(
         margins = np.append(margins[:n], at(factor).margin)
     return CriticalLoad(
         posture=pose,
-        wrench=always,
+        applied=always,
         stiffness=at(min(factor, _LARGEST / 2.0)),
-        load=multiplied,
+        multiplied=multiplied,
         factor=factor,
         limit=limit,
         factors=frozen(factors),
@@ -305,9 +323,11 @@ def critical_load(
     )
 
 
-def _margins(pose: Posture, minimum: Array, maximum: ArrayLike, wrenches: Array) -> Array:
-    """Compute margins or NaN (n,) for lower bounds (C,) or (n, 1) and wrenches (6,) or (n, 6)."""
-    q = np.tile(pose.q, (max(len(np.atleast_2d(rows)) for rows in (minimum, wrenches)), 1))
+def _margins(pose: Posture, minimum: Array, maximum: ArrayLike, loads: Sequence[Applied]) -> Array:
+    """Compute margins or NaN (n,) for lower bounds (C,) or (n, 1) and one load or n."""
+    q = np.tile(pose.q, (max(len(np.atleast_2d(minimum)), len(loads)), 1))
+    rows = AppliedRows.of(loads)
+    wrenches = AppliedRows(rows.at_tip[0], rows.loads) if len(loads) == 1 else rows
     bounds = np.broadcast_to(minimum, (len(q), len(pose.arm.cables))), maximum
     case: Any = {"minimum": bounds[0], "maximum": bounds[1], "check_limits": False}
     return np.asarray(evaluate(pose.arm, q, None, wrenches, ("margin",), **case)["margin"])

@@ -321,7 +321,9 @@ class Equilibrium(Result, Loaded):
             SingularStiffness: K_θ of the joints that are not at stops is singular.
         """
         u = unit_direction("direction", direction)
-        J_v = None if link is None else self.stiffness.jacobian_at(link, point)[:3]
+        J_v = None
+        if link is not None or point is not None:
+            J_v = self.stiffness.jacobian_at(link, point)[:3]
         return self.stiffness.tip_response(u, self._free, J_v)[0]
 
     def _along_axes(self) -> str:
@@ -373,7 +375,7 @@ class Equilibrium(Result, Loaded):
             rows.append((cable.name, f"{F:.3f}", f"{F0:.3f}", state))
         moved = coordinates(without_rounding(1000.0 * self.displacement))
         lines = [*aligned(rows), f"tip moved by {moved} mm", *events_text(self.events)]
-        lines += [*texts(self.applied), *([self.history] if self.history else [])]
+        lines += [*texts(self.pose.arm, self.applied), *([self.history] if self.history else [])]
         stopped = np.flatnonzero(self.stop_torque).tolist()
         if len(stopped) <= MOST_JOINTS:
             lines += [

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.applied import Applied, Loads, tip_part
+from cdsm.applied import Applied, tip_part
 from cdsm.errors import InvalidInput
 from cdsm.friction.capstan import assemble_segments
-from cdsm.loads import loads_of
+from cdsm.loads import LoadsLike, has_loads, loads_of
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
@@ -35,7 +35,8 @@ from cdsm.support.validation import WRENCH, instance, number_array, whole_number
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
 
-WrenchesLike = ArrayLike | Mapping[str, ArrayLike] | Sequence[Applied]
+WrenchesLike = ArrayLike | Mapping[str, ArrayLike] | Sequence[LoadsLike]
+"""Wrenches (n, 6) at the tip; or such wrenches by the names of links; or what acts n times."""
 
 _SHOWN = 24  # largest number of loads that are printed; of more, the first and the last ones
 
@@ -222,7 +223,8 @@ def load_cycle(
             its motors go on holding the tensions, or the lengths, of slack cables too; if it has a
             ``path``, the segments begin with the tensions that friction left them.
         wrenches: W of each load (n, 6) at ``tool0`` in base axes: force [N], then moment [N m]; or
-            a dict of them by links.
+            a dict of them by links; or a list of n entries, each a dict by links or a list of
+            :class:`~cdsm.Load`.
             Before the first load the wrench is that of the ``Tension``, or zero.
         motors: Commands of the motors at each load (n, C): for a position-controlled cable the rest
             length (at zero strain) of wire taken in since the reference [m], positive if the motor
@@ -299,8 +301,8 @@ def follow_loads(
 
 def _loads(arm: Manipulator, wrenches: WrenchesLike) -> Sequence[Applied]:
     """Return what acts at each load; InvalidInput if it is not (n, 6), or (n, 6) by links."""
-    if isinstance(wrenches, (list, tuple)) and any(isinstance(load, Loads) for load in wrenches):
-        return [loads_of(arm, load) for load in wrenches]
+    if isinstance(wrenches, (list, tuple)) and any(map(has_loads, wrenches)):
+        return [loads_of(arm, load, f"wrenches[{k}]") for k, load in enumerate(wrenches)]
     if not isinstance(wrenches, Mapping):
         return list(_rows("wrenches", wrenches))  # type: ignore[arg-type]
     rows = {link: _rows(f"wrenches[{link!r}]", W) for link, W in wrenches.items()}

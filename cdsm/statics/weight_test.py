@@ -10,7 +10,8 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.applied import Applied, LinkPoint, Loads, PointLoad, combined, scaled
+from cdsm.applied import combined, jacobian_at, load_at, position_at, scaled
+from cdsm.dead_loads import LinkPoint
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.loads import LoadsLike, link_point
@@ -96,7 +97,7 @@ class WeightTest(Result, Plotted):
 
     def _position(self, pose: Posture) -> Array:
         """Return where the weight hangs (3,) [m]."""
-        return _position(pose, self.point)
+        return position_at(pose, self.point)
 
     def _along(self, stiffness: Stiffness | Equilibrium) -> float:
         """Return the stiffness [N/m] along the force, where it hangs."""
@@ -139,7 +140,7 @@ class WeightTest(Result, Plotted):
     @quantity("m", "axis")
     def tangent_displacement(self) -> Array:
         """Displacement C_vv ΔF (3,) [m] that the compliance without the weight predicts."""
-        J = None if self.point is None else self.point.jacobian(self.unloaded.pose)
+        J = None if self.point is None else jacobian_at(self.unloaded.pose, self.point)
         return frozen(self.unloaded.compliance_of(J)[:3, :3] @ self.force)
 
     @quantity("N/m")
@@ -319,9 +320,9 @@ def weight_test(
         held = pose
         followed = False
     states = [unloaded]
-    at = None if link is None else link_point(pose.arm, link, point)
+    at = link_point(pose.arm, link, point)
     weight = np.append(force, np.zeros(3))
-    added: Applied = weight if at is None else Loads((PointLoad(at, weight),))
+    added = load_at(at, weight)
     W = unloaded.applied
 
     def model(share: float) -> LockedArm:
@@ -365,21 +366,16 @@ def weight_test(
     )
 
 
-def _position(pose: Posture, point: LinkPoint | None) -> Array:
-    """Return the position (3,) [m] of a point of a link, or of the tip."""
-    return pose.tip[:3, 3] if point is None else point.position(pose)
-
-
 def _displacements(
     model: Model, branch: list[Stage], events: Sequence[Event], point: LinkPoint | None
 ) -> Array:
     """Return how far the tip or a point has moved at each event of a branch (m, 3) [m]."""
-    start = _position(branch[0].pose, point)
+    start = position_at(branch[0].pose, point)
     moves = list[Array]()
     for event in events:
         near = min(branch, key=lambda stage: abs(stage.share - event.share))
         stage = equilibrium_near(model, event.share, near) or near
-        moves.append(_position(stage.pose, point) - start)
+        moves.append(position_at(stage.pose, point) - start)
     return frozen(np.array(moves).reshape(-1, 3))
 
 

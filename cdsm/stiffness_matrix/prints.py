@@ -101,7 +101,7 @@ def notes(K: Stiffness) -> tuple[str, ...]:
     stiffness = f"smallest joint stiffness {least_joint_stiffness(K)}"
     least = f"{K.verdict.word}, {stiffness} ({model_of(K)})"
     line = K.posture.arm.motors.line
-    return (*missing, *texts(K.applied), *([line] if line else []), least)
+    return (*missing, *texts(K.posture.arm, K.applied), *([line] if line else []), least)
 
 
 def model_of(K: Stiffness) -> str:

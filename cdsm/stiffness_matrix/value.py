@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm import readings
-from cdsm.applied import Applied, Loaded, described, required_torque
+from cdsm.applied import Applied, Loaded, described, jacobian_at, required_torque
 from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.loads import link_point
 from cdsm.motors import Yielding
@@ -346,7 +346,7 @@ class Stiffness(Result, Loaded):
             (2104.8, 17182.8)
         """
         u = unit_direction("direction", direction)
-        J_v = None if link is None else self.jacobian_at(link, point)[:3]
+        J_v = None if link is None and point is None else self.jacobian_at(link, point)[:3]
         return self.tip_response(u, J_v=J_v)[0]
 
     def compliance_between(self, read: str, load: str) -> Array:
@@ -358,11 +358,9 @@ class Stiffness(Result, Loaded):
         J_a = self.jacobian_at(read, None)
         return frozen(J_a @ self._inverse @ self.jacobian_at(load, None).T)
 
-    def jacobian_at(self, link: str, point: ArrayLike | None) -> Array:
+    def jacobian_at(self, link: str | None, point: ArrayLike | None) -> Array:
         """Compute J (6, nv) of a point of a link."""
-        if link == self.posture.arm.tip_link and point is None:
-            return self.posture.jacobian
-        return link_point(self.posture.arm, link, point).jacobian(self.posture)
+        return jacobian_at(self.posture, link_point(self.posture.arm, link, point))
 
     def pseudoinverse(self, term: str = "joint") -> Array:
         """Compute J⁺ᵀ K J⁺ (3, 3) [N/m], J the linear rows of J_X: the paper's K_R, read literally.
@@ -573,7 +571,7 @@ class Stiffness(Result, Loaded):
     def to_dict(self) -> dict[str, object]:
         """Return the stiffness in SI for JSON, units in the keys; None for what does not exist."""
         more: dict[str, object] = {}
-        if loads := described(self.applied):
+        if loads := described(self.posture.arm, self.applied):
             more["loads"] = loads
         if self.posture.arm.motors.given:
             more["drives"] = self.posture.arm.motors.to_dict()

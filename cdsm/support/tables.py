@@ -17,7 +17,7 @@ ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 
 MEANINGFUL: Final = frozenset(
     {"force", "moment", "mass", "load", "direction", "displacement", "test", "target"}
-    | {"tension", "pull", "minimum", "maximum"}
+    | {"tension", "pull", "minimum", "maximum", "link", "load_link"}
 )
 """Names of columns that change an answer: a file whose reader does not know one is refused."""
 

@@ -8,13 +8,16 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.applied import Applied
 from cdsm.batch.evaluation import Batch, evaluate
 from cdsm.batch.quantities import derive
+from cdsm.batch.rows import AppliedRows
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.measures.clearance import KINDS, distances
@@ -41,7 +44,7 @@ class Cases:
 
     arm: Manipulator
     outputs: tuple[str, ...]  # names of quantities of a sweep
-    wrench: Array  # (W, 6): force [N], then moment [N m]
+    applied: tuple[Applied, ...]  # what acts in each of W cases
     minimum: Array  # lower bounds of tension (M,) [N], as asked
     maximum: float  # upper bound [N], as asked
     direction: Array  # unit directions (D, 3)
@@ -51,7 +54,12 @@ class Cases:
     @property
     def count(self) -> int:
         """Return the number of cases at each posture."""
-        return len(self.wrench) * len(self.minimum)
+        return len(self.applied) * len(self.minimum)
+
+    @cached_property
+    def acting(self) -> AppliedRows:
+        """What acts in each of W cases, as rows."""
+        return AppliedRows.of(self.applied)
 
     @property
     def is_slow(self) -> bool:
@@ -61,7 +69,7 @@ class Cases:
     @property
     def sizes(self) -> dict[str, int]:
         """Return the size of each dimension of an output or of the cases."""
-        sizes = {"wrench": len(self.wrench), "minimum": len(self.minimum)}
+        sizes = {"wrench": len(self.applied), "minimum": len(self.minimum)}
         sizes |= {"direction": len(self.direction), "cable": len(self.arm.cables)}
         sizes |= dict.fromkeys(("joint", "joint_column"), self.arm.nv)
         sizes |= dict.fromkeys(("axis", "axis_column"), 3)
@@ -83,13 +91,13 @@ class Cases:
         if not reached.all():
             return self._with_gaps(q, reached, threads)
         cases = self.count
-        wrench = np.tile(np.repeat(self.wrench, len(self.minimum), axis=0), (len(q), 1))
+        case = np.tile(np.repeat(np.arange(len(self.applied)), len(self.minimum)), len(q))
         low, high, bounded = self._bounds(q)
         names = self._batch_outputs()
         batch = evaluate(
             self.arm,
             np.repeat(q, cases, axis=0),
-            wrench=wrench,
+            wrench=self.acting.of_rows(case),
             outputs=names,
             direction=self.direction if "along" in names else None,
             minimum=low,
@@ -123,7 +131,8 @@ class Cases:
             for name, measure in self._measures(pose).items():
                 rows[name][i] = measure
             for row in range(i * cases, (i + 1) * cases):
-                forces = self._forces(pose, wrench[row], low[row], high[row]) if held[row] else {}
+                acts = self.applied[case[row]]
+                forces = self._forces(pose, acts, low[row], high[row]) if held[row] else {}
                 for name, force in forces.items():
                     rows[name][row] = force
         return rows
@@ -172,7 +181,7 @@ class Cases:
             measures["tension_factor"] = tension_factor(pose)
         return measures
 
-    def _forces(self, pose: Posture, wrench: Array, low: Array, high: Array) -> dict[str, Any]:
+    def _forces(self, pose: Posture, wrench: Applied, low: Array, high: Array) -> dict[str, Any]:
         """Compute the largest forces [N] that tensions within the bounds balance; 0 if none."""
         forces: dict[str, Any] = {}
         if "payload" in self.outputs:
@@ -186,7 +195,7 @@ class Cases:
     def _bounds(self, q: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return bounds (R, C) [N] at the motors, and whether worst friction leaves any (R,)."""
         least, most = self.held_bounds
-        low = np.tile(least, (len(q) * len(self.wrench), 1))
+        low = np.tile(least, (len(q) * len(self.applied), 1))
         high = np.tile(most, (len(low), 1))
         bounded = np.ones(len(low), dtype=np.bool_)
         if self.worst_friction:

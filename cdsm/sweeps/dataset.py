@@ -97,12 +97,20 @@ class Labelled(Cases):
         """Return the coordinates of arguments and of named dimensions, also of ``dims``."""
         used = {"axis", "cable", *CASES, *dims}
         used |= {dim for name in self.outputs for dim in _dims(name)}
-        force, moment = np.split(self.wrench, 2, axis=1)
+        force, moment = np.split(self.acting.at_tip, 2, axis=1)
+        loads = self.acting.loads
+        points = loads.points if loads else ()
+        on_links = loads.wrenches if loads else np.zeros((len(force), 0, 6))
+        places = np.array([point.local for point in points]).reshape(-1, 3)
+        used |= {"load"} if points else set()
         low, high = self.held_bounds
         coordinates: dict[str, Any] = {}
         for name, along, values, long_name, units in (
             ("force", ("wrench", "axis"), force, "force on the tip, base axes", "N"),
             ("moment", ("wrench", "axis"), moment, "moment on the tip, base axes", "N m"),
+            ("load_force", ("wrench", "load", "axis"), on_links[..., :3], "force on it", "N"),
+            ("load_moment", ("wrench", "load", "axis"), on_links[..., 3:], "moment on it", "N m"),
+            ("load_point", ("load", "axis"), places, "where it acts, in the link's frame", "m"),
             ("minimum", ("minimum",), self.minimum, "lower bound of all tensions, as asked", "N"),
             ("minimum_held", ("minimum", "cable"), low, "lower bound of a tension that held", "N"),
             ("maximum", (), self.maximum, "upper bound of all tensions, as asked", "N"),
@@ -119,6 +127,9 @@ class Labelled(Cases):
         for dim, names in labels.items():
             if dim in used - coordinates.keys() and names is not None:
                 coordinates[dim] = _labels(dim, names)
+        if points:
+            links = np.array([point.link for point in points], dtype=object)
+            coordinates["load_link"] = ("load", links, {"long_name": "link on which a load acts"})
         return coordinates
 
     def _attributes(self, name: str) -> dict[str, Any]:

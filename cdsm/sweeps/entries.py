@@ -8,6 +8,7 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.applied import Applied
 from cdsm.errors import listed
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
@@ -29,7 +30,7 @@ class Entries:
         status: :class:`Status` of each entry (N,).
         minimum: Lower bound [N] of the tensions.
         maximum: Upper bound [N] of the tensions.
-        wrench: W (6,).
+        wrench: What acts: W (6,) at the tip, or loads.
         worst_friction: Whether the bounds are narrowed for friction.
     """
 
@@ -38,7 +39,7 @@ class Entries:
     status: NDArray[np.int8]
     minimum: float
     maximum: float
-    wrench: Array
+    wrench: Applied
     worst_friction: bool = False
 
     def count(self, cause: Status) -> int:

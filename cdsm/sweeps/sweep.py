@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.batch.distribution import check_wrench_rows
+from cdsm.applied import Applied, Loads
+from cdsm.batch.distribution import check_load_rows
+from cdsm.dead_loads import Load
 from cdsm.errors import InvalidInput, need
+from cdsm.loads import LoadsLike, has_loads, loads_of
 from cdsm.manipulator import Manipulator
 from cdsm.quantities import names_of, require_name
 from cdsm.support.files import as_path
@@ -41,7 +44,7 @@ def sweep(
     *,
     minimum: ArrayLike = 0.0,
     maximum: float = np.inf,
-    wrench: ArrayLike | Mapping[str, ArrayLike] = NO_WRENCH,
+    wrench: LoadsLike | Mapping[str, LoadsLike] | Sequence[LoadsLike] = NO_WRENCH,
     direction: Direction | Sequence[Direction] | Mapping[str, Direction] = XYZ,
     outputs: Iterable[str] = DEFAULT,
     worst_friction: bool = False,
@@ -65,8 +68,11 @@ def sweep(
             whose client is active, when it is needed. A chunk costs some 30 ms of its own.
         minimum: Lower bound of all tensions [N]. Several bounds make the dimension ``minimum``.
         maximum: Upper bound of all tensions [N]; inf for no bound.
-        wrench: Wrench at ``tool0`` in base axes (6,): force [N], then moment [N m]. Several, (W, 6)
-            or by name, make the dimension ``wrench``.
+        wrench: Wrench at ``tool0`` in base axes (6,): force [N], then moment [N m]; or loads on any
+            links, a dict of wrenches by link or a list of :class:`~cdsm.Load`. Several, (W, 6), a
+            list of cases, or a dict of cases by name (no link has one of these names), make the
+            dimension ``wrench``. Loads on links have the dimension ``load``, and are told by the
+            coordinates ``load_link``, ``load_point``, ``load_force`` and ``load_moment``.
         direction: Direction of ``along``: an axis such as ``"z"``, or (3,), any length. Several,
             axes, (D, 3) or by name, make the dimension ``direction``.
         outputs: Names of quantities, as the reference lists them.
@@ -107,21 +113,20 @@ def sweep(
     lows = distinct("minimum", minimum)
     for low in lows.tolist():
         checked_bounds(instance("arm", arm, Manipulator), low, maximum)
-    loads, wrenches = _named(wrench)
+    applied, loads = _cases_of(arm, wrench)
     ways, directions = _named(direction)
-    W = check_wrench_rows(wrenches, len(wrenches))
     u = unit_directions("direction", directions)
     cases = Labelled(
         arm=arm,
         outputs=tuple(require_name("output", name, "sweep") for name in names),
-        wrench=np.atleast_2d(W),
+        applied=applied,
         minimum=lows,
         maximum=checked_quantity("maximum", maximum, "tension", zero=True, infinite=True),
         direction=np.atleast_2d(u),
         worst_friction=worst_friction,
         diameter=diameter,
         names={
-            "wrench": None if W.ndim == 1 else loads or range(len(W)),
+            "wrench": loads,
             "minimum": None if np.ndim(minimum) == 0 else lows.tolist(),
             "direction": None if u.ndim == 1 else ways or range(len(u)),
         },
@@ -133,6 +138,25 @@ def sweep(
         return cases.dataset(angles_of(arm, q), is_shown)
     angles = angles_of(arm, q, CHUNK * cases.together)
     return sweep_to_store(as_path(store), cases, angles, by_dask, is_shown)
+
+
+def _cases_of(arm: Manipulator, value: Any) -> tuple[tuple[Applied, ...], Sequence[object] | None]:
+    """Return what acts in each case, and the names or numbers of cases; None: there is one."""
+    links = {*arm.body.link_names}
+    one = isinstance(value, (Load, Loads)) or (
+        bool(value) and {*value} <= links
+        if isinstance(value, Mapping)
+        else isinstance(value, (list, tuple)) and any(isinstance(load, Load) for load in value)
+    )
+    if one:
+        return (loads_of(arm, value),), None
+    names, wrenches = _named(value)
+    if isinstance(wrenches, (list, tuple)) and any(map(has_loads, wrenches)):
+        labels = names or range(len(wrenches))
+        pairs = zip(labels, wrenches, strict=True)
+        return tuple(loads_of(arm, case, f"wrench[{name!r}]") for name, case in pairs), labels
+    W = check_load_rows(arm, wrenches, len(wrenches)).at_tip
+    return tuple(np.atleast_2d(W)), None if W.ndim == 1 else names or range(len(W))
 
 
 def _named(value: Any) -> tuple[Sequence[str] | None, Any]:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.batch.quantities import Codes
 from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.loads import LoadsLike
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.status import Status
@@ -174,7 +175,7 @@ def uncertainty(
     direction: Direction | None = None,
     of: str = "along",
     cable: str | None = None,
-    wrench: ArrayLike | None = None,
+    wrench: LoadsLike | None = None,
     redistribute: bool = False,
 ) -> Uncertainty:
     """Compute the standard uncertainty of a number of an arm to first order (JCGM 100, Eq. 13).
@@ -200,7 +201,7 @@ def uncertainty(
             smallest eigenvalue of K_θ [N m/rad]. ``"tip_along"``: the tip's coordinate along u [m].
             ``"tension"``: the least tension of a cable [N], always distributed again.
         cable: Name of the cable, for ``"tension"`` only.
-        wrench: W (6,) of your own tensions, as for :func:`~cdsm.stiffness`.
+        wrench: What acts with your own tensions, as for :func:`~cdsm.stiffness`.
         redistribute: Distribute the tensions of each arm again; ``tension`` is a least
             :class:`~cdsm.Tension`, and its tolerance has no influence.
 

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch.quantities import Codes, derive
-from cdsm.batch.rows import Rows
+from cdsm.batch.rows import AppliedRows, Rows
 from cdsm.batch.solution import solve_rows
 from cdsm.errors import InvalidInput
+from cdsm.loads import LoadsLike
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.quantities import QUANTITIES, Quantity, display_of, require_name
@@ -115,10 +116,12 @@ class Measurand(ReadOnlyState):
         q = np.tile(K.posture.q, (count, 1))
         q[:, ~arm.slides] += errors.get("joint_angle", none)
         q[:, arm.slides] += errors.get("joint_position", none)
+        acting = AppliedRows.of([K.applied])
         rows = Rows(
             arm=arm,
             q=q,
-            wrench=K.wrench[None],
+            wrench=acting.at_tip,
+            loads=acting.loads,
             names=self.quantity.reads or (self.of,),
             tension=None if self.redistribute else F,
             bounds=bounds,
@@ -145,8 +148,8 @@ class Measurand(ReadOnlyState):
         if self.redistribute:
             assert K.distribution is not None
             bounds = K.distribution.minimum_held, K.distribution.maximum_held
-            tension = distribute_tension(pose, *bounds, K.wrench)
-        wrench = None if self.redistribute else K.wrench
+            tension = distribute_tension(pose, *bounds, K.applied)
+        wrench = None if self.redistribute else K.applied
         return replace(self, stiffness=stiffness(pose, tension, wrench)).value()
 
     def _of_rebuilt(self, errors: Errors) -> Array | float:
@@ -180,7 +183,7 @@ def measurand_of(
     direction: Direction | None,
     of: str,
     cable: str | None,
-    wrench: ArrayLike | None,
+    wrench: LoadsLike | None,
     redistribute: bool,
 ) -> Measurand:
     """Check the arguments of :func:`~cdsm.uncertainty`; return the measurand they describe."""

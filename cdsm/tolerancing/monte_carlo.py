@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from cdsm.batch.distribution import checked_threads
 from cdsm.batch.quantities import Codes
 from cdsm.errors import InvalidInput
+from cdsm.loads import LoadsLike
 from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.support.format import with_uncertainty
@@ -124,7 +125,7 @@ def monte_carlo(
     direction: Direction | None = None,
     of: str = "along",
     cable: str | None = None,
-    wrench: ArrayLike | None = None,
+    wrench: LoadsLike | None = None,
     redistribute: bool = False,
     draws: int = 100_000,
     seed: int = 0,
@@ -144,7 +145,7 @@ def monte_carlo(
         direction: As for :func:`~cdsm.uncertainty`, and so are the next four.
         of: The measurand.
         cable: Name of the cable.
-        wrench: W (6,) of your own tensions.
+        wrench: What acts with your own tensions.
         redistribute: Distribute the tensions of each arm again.
         draws: Number of arms, 100 to 10⁸.
         seed: Seed of the random numbers, from 0.

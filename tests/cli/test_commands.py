@@ -111,6 +111,69 @@ def test_stiffness_under_loads_on_links(probe: Path, pose: cdsm.Posture) -> None
     assert answer["along_N_per_m"] == pytest.approx([K.along(u) for u in "xyz"])
 
 
+def test_weights_hang_on_links(probe: Path, pose: cdsm.Posture, tmp_path: Path) -> None:
+    at = ("--angles", 8, "--minimum", 30, "--maximum", 300)
+    tension = cdsm.distribute_tension(pose, 30.0, 300.0)
+    weight = 0.2 * pose.arm.gravity
+    found = told("weigh", probe, *at, "--mass", "0.2@link1", "--steps", 2)
+    test = cdsm.weight_test(pose, tension, weight, steps=2, link="link1")
+    assert found["displacements_m"][-1] == pytest.approx(test.displacement.tolist())
+    held = cdsm.payload(pose, weight, 30.0, 300.0, tension=tension.values, link="link1").locked
+    assert held is not None
+    assert found["holds"] == prepare_json(held.to_dict())
+    rows = {"link1": [[*weight, 0, 0, 0]], "link2": [[0, 0, 0, 0, 0.1, 0]]}
+    both = ("--mass", "0.2@link1", "--load", "0,0,0,0,0.1,0@link2", "--cycles", 1, "--steps", 1)
+    history = cdsm.load_cycle(pose, tension, rows)
+    cycled = told("weigh", probe, *at, *both)
+    assert cycled["tip_m"][0] == pytest.approx(history.tip[0].tolist())
+    found = told("buckle", probe, *at, "--load", "0,0,-3@link2")
+    load = {"link2": [0, 0, -3, 0, 0, 0]}
+    critical = cdsm.critical_load(pose, load, 30.0, 300.0)
+    assert found["critical_load"]["factor"] == pytest.approx(critical.factor)
+    assert found["payload"]["following"]["force_N"] == pytest.approx(
+        3.0 * critical.factor, rel=1e-5
+    )
+    planned = ("plan", probe, *at, "--direction", "z", "--load", "0,0,-3@link2", "--target", 20)
+    plan = cdsm.plan_stiffness(pose, "z", 20e3, 30.0, 300.0, load)
+    assert told(*planned)["tension_N"] == pytest.approx(dict(plan.tension))
+    path = tmp_path / "path.csv"
+    path.write_text(f"{pose.arm.joint_names[0]} [deg]\n8\n4\n")
+    along = told("plan", probe, "--path", path, *planned[-4:], *at[2:], "--direction", "z")
+    q = np.zeros((2, 6))
+    q[:, 0] = np.deg2rad([8.0, 4.0])
+    expected = cdsm.plan_path(pose.arm, "z", 20e3, 30.0, 300.0, load, angles=q)
+    np.testing.assert_allclose(along["tensions_N"], expected.tensions, rtol=1e-6)
+    table = tmp_path / "sweep.nc"
+    told("sweep", probe, *at, "--load", "0,0,-3@link2", "--out", table)
+    swept = xr.load_dataset(table)
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 30.0, 300.0, load))
+    np.testing.assert_allclose(swept["along"].values.ravel(), [K.along(u) for u in "xyz"])
+    assert swept["load_link"].values.tolist() == ["link2"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("stiffness --load 0,0,1@lnik2", "--load: no link is called 'lnik2'; did you mean 'link2'"),
+        ("stiffness --mass 1@base_link", "--mass: 'base_link' is the base"),
+        ("stiffness --load 0,0,1@link2 --load 1,0,0@link2", "--load: link2 is given twice; add"),
+        ("weigh --mass 1 --mass 2", "--mass: tool0 is given twice; add them up"),
+        ("weigh --load 0,0,1@link1 --load 0,0,1@link2", "one weight hangs on one link. --cycles"),
+        ("weigh --load 0,0,1,1,0,0@link1", "a weight is a force: FX,FY,FZ. --cycles takes"),
+        ("plan --direction z --mass -1@link2", "--mass: -1 kg given; give a mass from 0 kg on"),
+        ("sweep --random 2 --load 1,2@link2", "--load: 2 given; give FX,FY,FZ or"),
+        ("view --load 0,0,1@link2", "acts on link2, but the view has one at the tip"),
+    ],
+)
+def test_wrong_links_of_options_are_named(probe: Path, words: str, said: str) -> None:
+    command, *options = words.split()
+    out = ["--out", probe.with_suffix(".nc")] if command == "sweep" else []
+    minimum = ["--minimum", 30] if command != "view" else []
+    result = call(command, probe, *options, *minimum, *out)
+    assert result.exit_code == 2
+    assert said in " ".join(result.stderr.replace("│", " ").split())
+
+
 def test_stiffness_with_tolerances_and_friction(probe: Path, pose: cdsm.Posture) -> None:
     changes = ("--set", "tolerances.joint_angle=0.01", "--set", "friction=0.1")
     found = told("stiffness", probe, "--angles", 8, "--minimum", 30, *changes)
