@@ -47,6 +47,11 @@ PINNED = {
         "sheath, bent by 180 degrees: 73.3%",
         "rolling: active term +0.0410",
     ],
+    "11_what_load_cells_tell": [
+        "unknown directions: RMS error [5.32 0.85 1.27] N",
+        "after the pull: RMS error [2.73 0.44 0.5 ] N",
+        "on link3, 20 mm from its joint: [0.96 4. ] N",
+    ],
 }
 
 
