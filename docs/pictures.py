@@ -1,4 +1,4 @@
-"""Draw the pictures of README and of the first page: ``python docs/pictures.py``.
+"""Draw the pictures of README and of the first page: ``python -m docs.pictures``.
 
 The arm is that of README. Written to ``docs/pictures``; committed, since README shows them.
 """
@@ -6,18 +6,23 @@ The arm is that of README. Written to ``docs/pictures``; committed, since README
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
+from scipy.optimize import brentq
 
 import cdsm
 from cdsm import plots
+from tests.validation import rod
 
 FOLDER = Path(__file__).parent / "pictures"
 FRAMES = 36
 COLORS = 48
 """Number of frames and colours of the animation."""
+BEST = 80.7, 0.0946
+"""E [GPa] and μ that fit the shapes of the measured rod best, as on the page on validation."""
 
 geometry = cdsm.Geometry.universal(
     joints=4, cables_per_joint=3, link_length=0.06, base_length=0.03, disk_offset=0.012,
@@ -58,7 +63,45 @@ def animation() -> None:
     flat[0].save(FOLDER / "bend.gif", save_all=True, append_images=flat[1:], duration=107, loop=0)
 
 
+def measured() -> None:
+    """Draw the measured rod: its shapes, and E by the direction of its end at each tension."""
+    figure = Figure(figsize=(7.0, 3.0), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.2])
+    shapes = rod.shapes_in_plane()
+    for k in range(1, len(shapes)):
+        computed = rod.in_plane(rod.predicted(*BEST))[k]
+        left.plot(computed[:, 1], -computed[:, 0], color="C0", label="cdsm" if k == 1 else None)
+        dots = {"color": "0.1", "label": "measured" if k == 1 else None}
+        left.plot(shapes[k, :, 1], -shapes[k, :, 0], ".", **dots)
+    left.set(aspect="equal", xlabel="across [mm]", ylabel="along [mm]")
+    left.legend(loc="lower right")
+    for mu, mark in ((0.0, "s"), (BEST[1], "o")):
+        moduli = [modulus_of_end(mu, k) for k in range(1, len(shapes))]
+        right.plot(rod.TENSIONS[1:], moduli, f"{mark}-", label=f"friction μ = {mu:.2g}")
+    right.set(xlabel="tension [N]", ylabel="E that the end's direction asks for [GPa]")
+    right.legend()
+    plots.save_figure(figure, FOLDER / "measured.png")
+
+
+def modulus_of_end(mu: float, k: int) -> float:
+    """Find E [GPa] with which the last three gaps point as measured at tension k."""
+
+    def off(E: float) -> float:
+        ways = [shape[-1] - shape[-4] for shape in (rod.shapes_in_plane()[k], at(E))]
+        directions = [np.arctan2(way[1], way[0]) for way in ways]
+        return float(directions[1] - directions[0])
+
+    def at(E: float) -> Any:
+        bent = cdsm.presets.rod_one_tendon(1e9 * E, mu)
+        rest = cdsm.forward_statics(bent, tension=[rod.TENSIONS[k]])
+        return rod.in_plane(rod.disk_centres(rest.pose))
+
+    return float(brentq(off, 62.0, 110.0, xtol=0.05))
+
+
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
+    plt.style.use(plots.STYLE)
+    measured()
     still()
     animation()

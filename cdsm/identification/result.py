@@ -16,6 +16,7 @@ from cdsm.errors import InvalidInput
 from cdsm.identification.intervals import interval
 from cdsm.identification.least_squares import LeastSquares, Test
 from cdsm.identification.measurement import WeightLoop, measurement_name
+from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.determination import Determination, chi_square_text, likely
@@ -252,7 +253,10 @@ class Identification(Result, Plotted):
             tests.append((measurement_name(i, measurement.label), *texts, worst))
         note = "(95 % from the std of the linear model; in Python, confidence() profiles χ²)"
         model = f"({frictionless_model(self.arm)}; secant where a force is given; "
-        model += "loops with friction; tips at rest)"
+        pulled = self.arm.has_friction and any(
+            isinstance(m, TipPosition) for m in self.measurements
+        )
+        model += f"loops with friction; tips at rest{', pulled with friction' * pulled})"
         warned = self.correlated()
         ridges = [self.ridge(i, j) for i, j in self.correlated(_RIDGED) if (i, j) not in warned]
         shown = [*aligned(lines), note, *ridges, "", *aligned(tests), model, "", self.verdict]
