@@ -15,6 +15,7 @@ import typer
 
 import cdsm
 from cdsm.cli.arm import export, new, view
+from cdsm.cli.estimate import estimate
 from cdsm.cli.identify import fit, identify_parameters, reproduce
 from cdsm.cli.options import opt
 from cdsm.cli.output import debug_wanted, reported
@@ -64,6 +65,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "view": view,
     "fit": fit,
     "identify": identify_parameters,
+    "estimate": estimate,
     "export": export,
     "reproduce": reproduce,
 }

@@ -239,7 +239,7 @@ class LoadEstimate(TensionEstimate, Plotted):
         if wide:
             warnings.append(
                 f"friction of unknown direction can hide {listed(wide, 3)}: let each motor pull "
-                "until its cable slides in all holes, read then, and give sliding=1"
+                "until its cable slides in all holes, read then, and give sliding=1 (--sliding in)"
             )
         return (*warnings, *super().warnings)
 

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.estimation.files import read_load_cells
 from tests.cli.test_commands import call, told
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SAMPLES = EXAMPLES / "data"
 ARM = EXAMPLES / "arm.toml"
+READERS = ("fit", "identify", "sweep", "estimate")
 
 
 def test_each_sample_is_read_by_the_command_that_names_it(tmp_path: Path) -> None:
@@ -26,9 +28,55 @@ def test_each_sample_is_read_by_the_command_that_names_it(tmp_path: Path) -> Non
         assert swept["entries"]["ok"] == count
     plan = ("plan", ARM, "--direction", "z", "--target", 4, "--path")
     assert len(told(*plan, SAMPLES / "PATH.csv")["tensions_N"]) == 5
-    help_texts = "".join(call(name, "--help").output for name in ("fit", "identify", "sweep"))
+    help_texts = "".join(call(name, "--help").output for name in READERS)
     for sample in SAMPLES.glob("*.csv"):
         assert sample.name in help_texts or sample.name == "TIPS.csv"
+
+
+def test_load_cells_are_read_with_their_angles(tmp_path: Path) -> None:
+    """Made with 0.5 N and 0.1° of noise, empty and with 0.3 kg at the tip."""
+    file = SAMPLES / "LOAD_CELLS.csv"
+    figure = tmp_path / "load.png"
+    std = ("--tension-std", 0.5, "--angle-std", 0.1)
+    found = told("estimate", ARM, file, *std, "--figure", figure)["readings"]
+    assert figure.exists()
+    assert [*found] == ["empty", "0.3 kg"]
+    for label, force in (("empty", 0.0), ("0.3 kg", -0.3 * 9.81)):
+        one = found[label]
+        off = one["loads_N_or_Nm"]["fz at tool0"] - force
+        assert abs(off) < 2.0 * one["std_N_or_Nm"]["fz at tool0"] < 1.0
+        assert one["warnings"] == []
+    sought = ("--link", "tool0=fy,fz", "--link", "link2=moment", "--set", "friction=0.1")
+    rough = told("estimate", ARM, file, *std, *sought, "--sliding", "in")["readings"]["empty"]
+    assert [*rough["band_N_or_Nm"]][1:3] == ["fz at tool0", "mx at link2"]
+    assert {*rough["sliding"].values()} == {1.0}
+    printed = call("estimate", ARM, file, *std, "--set", "friction=0.1").output
+    assert "give sliding=1 (--sliding in)" in printed
+    twice = call("estimate", ARM, file, *std, "--link", "tool0", "--link", "tool0=moment")
+    assert twice.exit_code == 2
+    assert "is given twice" in twice.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "cable1_2 [N]",
+            "cable1_2 [kg]",
+            r"cable1_2 has no unit that is known; call it cable1_2 \[N\]",
+        ),
+        ("cable1_2 [N]", "spare", "has no column cable1_2"),
+        ("joint2_1 [deg]", "joint9_1 [deg]", "has a column joint9_1, which is not known"),
+        ("10.01", "", "line 4, column joint1_1: '' is not a finite number"),
+        ("joint1_1 [deg]", "mass [kg]", "has a column mass, which is not read"),
+    ],
+)
+def test_wrong_files_of_load_cells_are_named(tmp_path: Path, old: str, new: str, said: str) -> None:
+    text = (SAMPLES / "LOAD_CELLS.csv").read_text(encoding="utf-8")
+    file = tmp_path / "cells.csv"
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(cdsm.FileError, match=said):
+        read_load_cells(file, cdsm.Manipulator.read(ARM))
 
 
 def test_tip_positions_are_read_with_their_loads() -> None:

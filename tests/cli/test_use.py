@@ -165,7 +165,8 @@ def test_a_damaged_store_is_named_and_its_status_computed_again(probe: Path) -> 
 
 
 def test_help_fits_a_terminal() -> None:
-    wanted = "new stiffness weigh buckle plan sweep design view fit identify export reproduce"
+    wanted = "new stiffness weigh buckle plan sweep design view fit identify estimate export "
+    wanted += "reproduce"
     assert [*COMMANDS] == wanted.split()
     for name in COMMANDS:
         page = CliRunner().invoke(app, [name, "--help"], terminal_width=80).output.splitlines()
