@@ -16,12 +16,13 @@ from cdsm.presets.prototype import (
     virtual_prototype,
     virtual_prototype_geometry,
 )
+from cdsm.presets.spirob import spirob
 
 # fmt: off
 __all__ = [
     "ELASTIC_STAGE", "STEEL_WIRE_200GPA", "STRAND_1X19", "STRAND_DIAMETER", "TEN_DEGREES",
     "nitinol_segment", "rod_one_tendon", "silicone_tentacle", "simplex", "sjtu_snake",
-    "tdcr_two_sections", "virtual_prototype", "virtual_prototype_geometry",
+    "spirob", "tdcr_two_sections", "virtual_prototype", "virtual_prototype_geometry",
 ]
 # fmt: on
 

@@ -5,12 +5,16 @@ Each row says what was fitted, and to what. docs/reference/validation.md shows t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 import cdsm
+from cdsm.presets.spirob import MEASURED_JOINTS
+from cdsm.springs.fit import SpringFit
 from cdsm.support.values import Array
 from tests.validation import rod, tentacle
 
@@ -149,5 +153,39 @@ def markdown(table: list[Row]) -> str:
     return "\n".join(lines)
 
 
+SPIROB = np.loadtxt(
+    Path(__file__).parents[1] / "data" / "spirob_joints.csv", delimiter=",", skiprows=3
+)
+"""Joint of the SpiRob, angle [°] and torque [mN m]."""
+
+STOP = math.radians(29.0)
+"""Angle at which hinges 1 and 11 of the SpiRob are at their stops."""
+
+
+def spring_fits() -> dict[int, SpringFit]:
+    """Fit a law to each measured hinge of the SpiRob, without the points at a stop."""
+    fits = {}
+    for joint in MEASURED_JOINTS:
+        _, angles, torques = SPIROB[SPIROB[:, 0] == joint].T
+        most = STOP if joint in (1, 11) else math.inf
+        fits[joint] = cdsm.fit_spring(np.deg2rad(angles), 1e-3 * torques, between=(0.0, most))
+    return fits
+
+
+def springs_markdown() -> str:
+    head = ["hinge", "points", "linear spring, 1 number: RMS", "law, 2 numbers: RMS"]
+    lines = ["| " + " | ".join([*head, "k at rest, a = 2° [N m/rad]", "exponent"]) + " |"]
+    lines.append("|--:|--:|--:|--:|--:|--:|")
+    for joint, fit in spring_fits().items():
+        mean = float(np.mean(fit.torque))
+        shares = [f"{100.0 * rms / mean:.1f} %" for rms in (fit.linear_rms, fit.rms)]
+        exponent = f"{fit.exponent:.2f} ± {fit.exponent_std:.2f}"
+        cells = [f"{joint}", f"{fit.angle.size}", *shares, f"{fit.stiffness:.2f}", exponent]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
 if __name__ == "__main__":
     print(markdown(rows()))
+    print()
+    print(springs_markdown())

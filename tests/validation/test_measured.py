@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cdsm.presets.spirob import EXPONENTS, MEASURED_JOINTS, TANGENTS
 from tests.notebooks.test_notebooks import same
 from tests.validation import measured
 
@@ -19,6 +20,16 @@ def test_the_page_shows_the_table_of_measured_arms() -> None:
     head = len(" | ".join(measured.HEAD).split()) + 1
     pairs = zip(words[head:], shown[1].split(), strict=False)
     assert [pair for pair in pairs if not same(*pair)] == []
+
+
+def test_laws_of_the_spirob_are_those_that_its_points_give() -> None:
+    """Within 3.6 % of the mean torque, where linear springs are 7.6 to 14 % off."""
+    assert measured.springs_markdown() in PAGE.read_text(encoding="utf-8")
+    fits = measured.spring_fits()
+    assert tuple(fits) == MEASURED_JOINTS
+    for fit, stiffness, exponent in zip(fits.values(), TANGENTS, EXPONENTS, strict=True):
+        assert fit.rms < 0.037 * fit.torque.mean() < 0.5 * fit.linear_rms
+        assert (fit.stiffness, fit.exponent) == pytest.approx((stiffness, exponent), abs=5e-4)
 
 
 @pytest.mark.parametrize(
