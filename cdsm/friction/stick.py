@@ -143,7 +143,7 @@ def breakaway(
     chains = segments.chains
     loads = np.full(segments.wrap.size, math.inf)
     sticks = can_stick(pose)
-    if math.isfinite(K.tip_response(u, J_v=J_v)[0]):
+    if sticks.any() and math.isfinite(K.tip_response(u, J_v=J_v)[0]):
         assert K.tension_gradient is not None
         motion = np.asarray(np.linalg.solve(K.joint, u @ J_v), np.float64)
         F = K.tension[chains.cable]
