@@ -33,6 +33,7 @@ _LONGEST = 0.2  # longest step of a joint [rad]
 _DENSE = 0.02  # distance [rad] of the postures at which the way to an equilibrium is checked
 _STEPS = 300  # most steps of the search for an equilibrium
 _SHORTER = 4  # most times that a step which goes too far is shortened
+_HALVINGS = 12  # most times that a step is halved around a kink
 _KICK = 0.01  # step off a saddle [rad]
 _NOISE = 1e-13  # |r| that is rounding, over the sum of magnitudes
 _APART = 1e-6  # a joint stops this far [rad] before its disks touch: cables have no direction there
@@ -225,16 +226,47 @@ def _descend(
 def _reached(f: Balance, here: Point, step: Array) -> tuple[Point | None, Array]:
     """Return the point after a step, and the step: shortened where the arm would swing back.
 
-    Where cables begin to stick, K grows within the step, and f·step has turned positive at its end:
-    the next end is where f·step is 0 if it is linear along the step.
+    Where cables begin to stick or to pull, K grows within the step, and f·step has turned positive
+    at its end: the next end is where f·step is 0 if it is linear along the step. If this end is far
+    short of it, since K has grown at once, the step ends between both.
     """
     there = f.attempt(here.x + step)
+    beyond = 0.0  # f·step at a longer step that went too far, per length of this one
+    whole = step
     for _ in range(_SHORTER):
         start = float(here.value @ step)
         if there is None or not 0.0 < -0.5 * start <= (end := float(there.value @ step)):
             break
+        whole = step
+        beyond = end
         step = start / (start - end) * step
         there = f.attempt(here.x + step)
+    if there is not None and beyond:
+        return _between(f, here, (there, step), whole)
+    return there, step
+
+
+def _between(
+    f: Balance, here: Point, short: tuple[Point, Array], whole: Array
+) -> tuple[Point | None, Array]:
+    """Return the point between a step that is too ``short`` and the ``whole`` one, too far.
+
+    Both are halved around the root of f·step, until it is half of what it is ``here`` or less.
+    """
+    start = float(here.value @ whole)
+    there, step = short
+    low = float(step @ whole) / float(whole @ whole)
+    high = 1.0
+    for _ in range(_HALVINGS):
+        if float(there.value @ whole) > 0.5 * start:
+            break
+        middle = (low + high) / 2.0
+        trial = f.attempt(here.x + middle * whole)
+        if trial is None or float(trial.value @ whole) > -0.5 * start:
+            high = middle
+            continue
+        low = middle
+        there, step = trial, middle * whole
     return there, step
 
 
