@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.arm import ComputedArm
+from cdsm.assembly import Assembly, assemble
 from cdsm.cable import Cable, serpentine_cables
 from cdsm.dead_loads import Load
 from cdsm.definition import ArmDefinition, Term
@@ -373,6 +374,35 @@ class Manipulator(ComputedArm):
             InvalidInput: A link does not exist or is the base, or two loads act at one point.
         """
         return self.replace(loads=[loads] if isinstance(loads, Load) else loads)
+
+    def assemble(self, pose: Posture, tension: ArrayLike) -> Assembly:
+        """Return how long the wires are that have these tensions at a posture, with motors at 0.
+
+        Motors that are fewer than cables keep Nᵀ l_0 of it (Nᵀ B = 0): what they can do later,
+        :func:`~cdsm.distribute_tension` and :func:`~cdsm.forward_statics` say with ``assembly=``.
+
+        Args:
+            pose: The posture of the assembly, of this arm.
+            tension: F (C,) [N] there, or the result of :func:`~cdsm.distribute_tension`.
+
+        Raises:
+            InvalidInput: The posture is of another arm; tensions are not (C,), negative, or of
+                another posture.
+            ElasticityRangeError: A tension is outside the domain of its law.
+
+        Example:
+            >>> import cdsm
+            >>> pair = cdsm.Motor("m1", {"cable1_1": 0.012, "cable1_2": -0.012})
+            >>> arm = cdsm.presets.virtual_prototype().with_motors([pair])
+            >>> straight = arm.at([0.0] * 10)
+            >>> assembly = arm.assemble(straight, cdsm.distribute_tension(straight, minimum=60.0))
+            >>> wire = assembly.missing_wire(arm.at([0.1] * 10))
+            >>> (1e3 * wire[:3]).round(2).tolist()
+            [-1.0, -1.0, 0.0]
+        """
+        if instance("pose", pose, Posture).arm is not self and pose.arm != self:
+            raise InvalidInput("pose", "is of another arm; take arm.at(q).")
+        return assemble(pose, tension)
 
     def with_gravity(self, gravity: Direction) -> Manipulator:
         """Return the same arm under another gravity: (3,) [m/s²] in base axes, or an axis.

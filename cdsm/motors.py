@@ -106,6 +106,10 @@ class Motor:
         """Whether it turns as its torque changes: it is compliant, or holds a torque."""
         return self.control == "torque" or math.isfinite(self.stiffness)
 
+    def can_give(self, torque: float) -> bool:
+        """Whether cables that only pull have the torque Bᵀ F [N m] under any tensions."""
+        return any(torque * radius >= 0.0 for radius in self.cables.values())
+
     def __str__(self) -> str:
         radii = ", ".join(f"{cable} {1e3 * r:+.4g} mm" for cable, r in self.cables.items())
         return f"{self.name} ({radii}): {self.holds}"
@@ -201,6 +205,10 @@ class Yielding(NamedTuple):
         """
         B = self.matrix
         return np.asarray(np.eye(k.size) - (k[:, None] * B) @ _inverse(self.of_motors(k)) @ B.T)
+
+    def softness(self, k: Array) -> Array:
+        """Compute (k_m + Bᵀ K_L B)⁻¹ (m, m) [rad/(N m)]: turns per torque, the joints held."""
+        return _inverse(self.of_motors(k))
 
     def yielded(self, slopes: Array, k: Array) -> Array:
         """Compute B (k_m + Bᵀ K_L B)⁻¹ Bᵀ ∂F/∂θ (C, nv) [m/rad]: wire that the motors let out.
@@ -401,6 +409,28 @@ class Motors(Printed):
         more = len(self.given) - _SHOWN
         shown += [f"and {more} more"] * (more > 0)
         return f"{self.count}: {'; '.join(shown)}"
+
+    def described(self, commands: Array) -> dict[str, object]:
+        """Return commands (M,) of motors for JSON: turns, torques, wire and tensions by name."""
+        numbers: dict[str, dict[str, float]] = {}
+        for m, (name, held) in enumerate(zip(self.names, self.holds_torque, strict=True)):
+            is_given = m < len(self.given)
+            kind = ("torque_Nm" if is_given else "tension_N") if held else "turn_rad"
+            kind = kind if held or is_given else "wire_m"
+            numbers.setdefault(f"motor_{kind}", {})[name] = float(commands[m])
+        return dict(numbers)
+
+    def commanded(self, commands: Array) -> str:
+        """Return commands (M,) of motors as text for people."""
+        words = []
+        for m, (name, held) in enumerate(zip(self.names, self.holds_torque, strict=True)):
+            is_given = m < len(self.given)
+            turn = (
+                f"{math.degrees(commands[m]):z.4g}°" if is_given else f"{1e3 * commands[m]:z.4g} mm"
+            )
+            load = f"{commands[m]:.4g} {'N m' if is_given else 'N'}"
+            words.append(f"{name} {load if held else turn}")
+        return "motors: " + ", ".join(words)
 
     def to_dict(self) -> dict[str, object]:
         """Return the given motors for JSON by name: radii [m], stiffness [N m/rad], control."""

@@ -78,6 +78,8 @@ class Equilibrium(Result, Loaded):
             and pull acted at once.
         path: How an arm with friction in its holes came there: with friction, where it rests
             depends on it. None: without friction, or motors were locked there.
+        commands: What the motors were told since their assembly (M,), in the order of
+            ``arm.motors``: turns [rad], torques [N m], wire [m] or tensions [N]; or None.
         history: The path in words, or that friction was left out; empty for an arm without it.
     """
 
@@ -94,6 +96,7 @@ class Equilibrium(Result, Loaded):
     branch: float = field(default=1.0, metadata=unit("1"))
     events: tuple[Event, ...] = field(default=(), metadata=unit("1"))
     path: LoadHistory | None = None
+    commands: Array | None = None
     history: str = field(default="", metadata=unit("1"))
 
     @property
@@ -338,8 +341,12 @@ class Equilibrium(Result, Loaded):
         if self.path is None:
             motors = self.pose.arm.motors
             turns = dict(zip(motors.names, self.motor_turns, strict=True))
-            yielded = {} if motors.yielding is None else {"motor_turn_rad": turns}
-            return merged(super().to_dict(), prepare_json(yielded))
+            more: dict[str, object] = {}
+            if motors.yielding is not None:
+                more["motor_yield_rad"] = turns
+            if self.commands is not None:
+                more |= motors.described(self.commands)
+            return merged(super().to_dict(), prepare_json(more))
         labels = self.path.segment_names
         followed = {
             "segment_tension_N": dict(zip(labels, self.path.segment_tensions[-1], strict=True)),
@@ -392,6 +399,8 @@ class Equilibrium(Result, Loaded):
             if self.motors == "locked"
             else "motors hold the tensions: cables add no stiffness of their own"
         )
+        if self.commands is not None:
+            lines.append(arm.motors.commanded(self.commands))
         lines += self._yielded()
         worst = int(abs(self.residual * arm.levers).argmax())
         residual = f"{abs(self.residual[worst]):.1e} {arm.torque_unit(worst)}"

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.applied import Applied, acts, as_loads, scaled
+from cdsm.assembly import Assembly, assemble
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.loads import LoadsLike, loads_of
 from cdsm.manipulator import Manipulator
+from cdsm.motors import refuse_rough, refuse_shared
 from cdsm.posture import Posture
 from cdsm.statics.continuation import follow
 from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, settled, with_forced
@@ -49,6 +51,8 @@ def forward_statics(
     tension: OfCables | None = None,
     rest_lengths: OfCables | None = None,
     pull: OfCables | None = None,
+    motors: ArrayLike | Mapping[str, float] | None = None,
+    assembly: Assembly | None = None,
     wrench: LoadsLike = NO_WRENCH,
     start: ArrayLike | None = None,
     friction: bool = True,
@@ -57,7 +61,8 @@ def forward_statics(
 
     Solve J_Lᵀ F + g + k (q − q_0) = J_Xᵀ W for q, between the joint limits. Joints that no cable
     holds need springs. Exactly one of ``tension``, ``rest_lengths`` and ``pull`` is given: (C,), or
-    a dict by the names of cables, the others being loose. With given tensions, cables add no
+    a dict by the names of cables, the others being loose; or ``motors``, what motors of several
+    cables are told. With given tensions, cables add no
     stiffness of their own (k_c = 0); motors that hold lengths are locked, and k_c counts.
     :attr:`Equilibrium.motors` says which: the two stiffnesses of one posture can differ by a factor
     of ten.
@@ -75,6 +80,12 @@ def forward_statics(
             the cables are just straight at the angles q_0 of the springs: these lengths become
             shorter by ``gain`` · pull − ``slack`` of each :class:`~cdsm.Cable`. A cable is straight
             at zero strain, where a law that begins above 0 N has its lowest tension.
+        motors: What motors are told, by their names in ``arm.motors``, others as at the assembly;
+            or (M,): how far they turn [rad] from there; of one that holds its torque the torque
+            Bᵀ F [N m]; of a cable's own motor wire taken in [m], or its tension [N].
+        assembly: Wires with the motors at 0, of :meth:`Manipulator.assemble`; with ``motors``.
+            Pulls then grow from its posture. Default: the cables are just straight at the angles
+            q_0 of the springs, as for ``pull``.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; or loads on any
             links, as for :func:`~cdsm.stiffness`.
         start: Angles q (nv,) [rad] at which the search begins, under the whole load. None: load and
@@ -97,7 +108,7 @@ def forward_statics(
         [222.8, 0.0, 97.1]
     """
     instance("arm", arm, Manipulator)
-    commands = {"tension": tension, "rest_lengths": rest_lengths, "pull": pull}
+    commands = {"tension": tension, "rest_lengths": rest_lengths, "pull": pull, "motors": motors}
     named = [name for name, value in commands.items() if value is not None]
     if len(named) != 1:
         problem = (
@@ -111,16 +122,27 @@ def forward_statics(
             "has no history, on which it depends where an arm with friction rests. Leave it out, "
             "follow the loads by load_cycle, or give friction=False.",
         )
-    W = loads_of(arm, wrench)
-    home = arm.at(home_angles(arm))
-    begin = home if start is None else arm.at(start)
-    model = _model(arm, named[0], _of_all(arm, named[0], commands[named[0]]), home, begin, W)
-    loaded = model(1.0)
-    if start is not None:
-        return as_equilibrium(loaded, settled(loaded, begin))
-    _require_held(model(0.0), home)
     if rough:
-        return _with_friction(model, home, W)
+        refuse_rough(arm.motors, arm.has_friction, "friction")
+    W = loads_of(arm, wrench)
+    home = _home(arm, assembly, named[0])
+    begin = home if start is None else arm.at(start)
+    if motors is None:
+        model = _model(arm, named[0], _of_all(arm, named[0], commands[named[0]]), home, begin, W)
+    else:
+        model = _driven_model(assembly or _straight(home), motors, begin, W)
+    loaded = model(1.0)
+    driven = dict[str, Any]()
+    if motors is not None:
+        wires = assembly or _straight(home)
+        driven = {"commands": wires.commanded(motors), "reference_tension": wires.tension}
+    if start is not None:
+        return replace(as_equilibrium(loaded, settled(loaded, begin)), **driven)
+    if assembly is None:
+        _require_held(model(0.0), home)
+    if rough:
+        before = "pulled from slack" if assembly is None else "driven from even tensions"
+        return replace(_with_friction(model, home, W, before), **driven)
     here = settled(model(0.0), home)
     branch = follow(model, stage_at(model, here.state.pose, here.stop_torque, 0.0), 1.0)
     force = sum(float(np.linalg.norm(load.wrench[:3])) for load in as_loads(W).loads)
@@ -130,10 +152,42 @@ def forward_statics(
     here = last.point
     if last.share < 1.0:
         here = settled(loaded, last.pose, reached)
-    return as_equilibrium(loaded, here, reached, events)
+    return replace(as_equilibrium(loaded, here, reached, events), **driven)
 
 
-def _with_friction(model: Model, home: Posture, wrench: Applied) -> Equilibrium:
+def _home(arm: Manipulator, assembly: Assembly | None, command: str) -> Posture:
+    """Return the posture from which pulls grow: of the assembly, or at q_0 of the springs."""
+    if assembly is None:
+        return arm.at(home_angles(arm))
+    if command != "motors":
+        raise InvalidInput("assembly", f"belongs to motors=, and {command} is given.")
+    home: Posture = instance("assembly", assembly, Assembly).posture
+    assembly.require_arm(arm.at(home.q))
+    return home
+
+
+def _straight(home: Posture) -> Assembly:
+    """Return the assembly whose cables are just straight at a posture."""
+    return assemble(home, home.arm.laws.rest)
+
+
+def _driven_model(
+    assembly: Assembly, motors: ArrayLike | Mapping[str, float], begin: Posture, wrench: Applied
+) -> Model:
+    """Return the arm of an assembly whose motors go from its commands to ``motors``."""
+    start = assembly.commands
+    goal = assembly.commanded(motors)
+    assembly.require_wire(goal)
+
+    def model(share: float) -> LockedArm:
+        wires = assembly.driven(start + share * (goal - start))
+        load = scaled(wrench, share)
+        return LockedArm(begin, wires.tension, load, wires.rest_length, torque=wires.torque)
+
+    return model
+
+
+def _with_friction(model: Model, home: Posture, wrench: Applied, before: str) -> Equilibrium:
     """Follow an arm with friction: its motors pull, then the ``wrench`` is hung on."""
 
     def pulled(share: float) -> LockedArm:
@@ -164,7 +218,7 @@ def _with_friction(model: Model, home: Posture, wrench: Applied) -> Equilibrium:
     wires = rest.cable_lengths if loaded.rest_length is None else loaded.rest_length
     slides = np.count_nonzero(path.sliding[-1])
     then = ", then loaded" if acts(wrench) else ""
-    history = f"with friction: pulled from slack in {_PULL_STEPS} steps{then}; {slides} of "
+    history = f"with friction: {before} in {_PULL_STEPS} steps{then}; {slides} of "
     history += f"{plural(len(path.holes), 'hole')} slide; another history ends elsewhere"
     return Equilibrium(
         reference=loaded.reference,
@@ -216,12 +270,18 @@ def _model(
 ) -> Model:
     count = len(arm.cables)
     if name == "tension":
+        remedy = "Give motors=: turns [rad], or torques [N m] of motors that hold them."
+        refuse_shared(arm.motors, "tension", remedy)
         F, _ = checked_tension(home, value, None)
         return lambda share: LockedArm(begin, share * F, scaled(wrench, share), tension_held=True)
     for cable in arm.cables:
         if cable.control == "force":
             problem = f"{cable.name} has control='force': its motor holds a tension, no length. "
             raise InvalidInput(name, f"{problem}Give tension, or this cable control='position'.")
+    for motor in arm.motors.given:
+        if motor.control == "torque":
+            problem = f"{motor.name} holds a torque, no length: give motors=, with its torque."
+            raise InvalidInput(name, problem)
     least = np.array([cable.elasticity.rest for cable in arm.cables])
     straight = arm.laws.original_lengths(home.cable_lengths, least)
     if name == "pull":

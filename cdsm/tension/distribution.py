@@ -11,16 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
 from cdsm.applied import Applied, Loaded, required_torque
+from cdsm.assembly import Assembly
 from cdsm.cable import breaking_forces, largest_share
 from cdsm.errors import InvalidInput, solver_failed
 from cdsm.loads import LoadsLike, loads_of
 from cdsm.motors import needs_assembly
 from cdsm.posture import Posture
 from cdsm.status import Status
-from cdsm.support.format import aligned
+from cdsm.support.format import aligned, merged
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, instance, one_of
 from cdsm.support.values import Array, IndexedByName, draw, frozen
+from cdsm.tension.assembled import assembled_tensions
 from cdsm.tension.bounds import Bounds, bounds_at
 from cdsm.tension.infeasibility import infeasible
 from cdsm.tension.least_tensions import least_tensions
@@ -50,6 +52,9 @@ class Tension(Result, Loaded, IndexedByName):
         solver: Name of the solver that computed them.
         least: Whether they are the smallest tensions within the bounds; False if they were planned
             for a stiffness.
+        assembly: The assembly whose motors give them; None: they have free choice.
+        commands: What its motors are told (M,), in the order of ``arm.motors``: turns [rad], or
+            torques [N m]; of a cable's own motor wire [m], or tension [N].
 
     Example:
         >>> import cdsm
@@ -71,6 +76,8 @@ class Tension(Result, Loaded, IndexedByName):
     maximum_held: Array = field(metadata=unit("N", "cable"))
     solver: str = field(metadata=unit("1"))
     least: bool = True
+    assembly: Assembly | None = None
+    commands: Array | None = None
 
     @quantity("torque", "joint")
     def residual(self) -> Array:
@@ -102,7 +109,7 @@ class Tension(Result, Loaded, IndexedByName):
     def warnings(self) -> tuple[str, ...]:
         """A sentence if motors move several cables, and cannot give all of these tensions."""
         motors = self.posture.arm.motors
-        return () if motors.are_free else (needs_assembly(motors),)
+        return () if motors.are_free or self.assembly else (needs_assembly(motors),)
 
     @property
     def at_minimum(self) -> tuple[str, ...]:
@@ -119,8 +126,11 @@ class Tension(Result, Loaded, IndexedByName):
         return tuple(self.keys()[c] for c in np.flatnonzero(tight))
 
     def to_dict(self) -> dict[str, object]:
-        """Return all numbers in SI for JSON, and the warnings, if there are any."""
-        return {**super().to_dict(), **({"warnings": [*self.warnings]} if self.warnings else {})}
+        """Return all numbers in SI for JSON, commands of motors, and warnings if there are any."""
+        more: dict[str, object] = {"warnings": [*self.warnings]} if self.warnings else {}
+        if self.commands is not None:
+            more |= self.posture.arm.motors.described(self.commands)
+        return merged(super().to_dict(), more)
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Plot the tension [N] of each cable as a bar, with its bounds, and return the axes.
@@ -134,6 +144,8 @@ class Tension(Result, Loaded, IndexedByName):
         rows = aligned([("cable", "tension [N]"), *((c, f"{self[c]:.3f}") for c in self)])
         unit = self.posture.arm.torque_unit()
         rows += [share] if (share := largest_share(self.posture.arm.cables, self.values)) else []
+        if self.commands is not None:
+            rows.append(self.posture.arm.motors.commanded(self.commands))
         rows.append(f"static residual: {abs(self.residual).max():.1e} {unit}")
         return "\n".join([*self.warnings, *rows])
 
@@ -147,6 +159,7 @@ def distribute_tension(
     *,
     fixed: Mapping[str, float] | None = None,
     worst_friction: bool = False,
+    assembly: Assembly | None = None,
 ) -> Tension:
     """Compute the smallest tensions in balance: min ½‖F‖² with J_Lᵀ F = J_Xᵀ W − g (Eqs. 13, 17).
 
@@ -162,13 +175,18 @@ def distribute_tension(
         worst_friction: Keep the tension of each segment within the bounds, for any earlier loads:
             between F exp(−Σ μ φ) and F exp(Σ μ φ), with the friction coefficients μ and wrap angles
             φ of the holes of its cable. The bounds of F narrow by these factors.
+        assembly: Wires with the motors at 0, of :meth:`Manipulator.assemble`. The tensions are then
+            the least that its M motors give, F = f(L; l_0 − B φ), with ``commands`` φ. Without it,
+            each cable has the wire that its tension needs: motors that are fewer than cables have
+            it only if the arm was assembled for this posture, as the result says.
 
     Raises:
         InvalidInput: An argument has the wrong shape or is not a number, or a minimum is above its
             maximum, possibly after ``worst_friction`` has narrowed them. The solver is not
             installed, or a fixed cable does not exist.
         InfeasibleTension: No tension within the bounds balances the arm. The error gives the
-            missing torque, and how far the bounds of cables without a fixed tension must widen.
+            missing torque, and how far the bounds of cables without a fixed tension must widen. Or
+            the motors of the assembly give none of them.
         CdsmError: The solver's solution does not meet the optimality conditions.
 
     Example:
@@ -184,6 +202,13 @@ def distribute_tension(
         raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
     bounds = bounds_at(pose, minimum, maximum, worst_friction, fixed=tensions)
     load = loads_of(pose.arm, wrench)
+    if assembly is not None:
+        instance("assembly", assembly, Assembly).require_arm(pose)
+        F, commands = assembled_tensions(
+            pose, assembly, bounds, required_torque(pose, load), solver
+        )
+        given: Any = {"assembly": assembly, "commands": commands, **bounds._asdict()}
+        return Tension(posture=pose, values=F, applied=load, solver=solver, **given)
     return least_tension(pose, bounds, load, solver, tuple(tensions))
 
 

@@ -65,7 +65,7 @@ def test_equilibrium_says_by_how_far_motors_yield() -> None:
     assert abs(np.rad2deg(abs(rest.motor_turns).max()) - 0.2) < 0.15
     assert "motors yield: m1 by " in str(rest)
     numbers: Any = json.loads(json.dumps(rest.to_dict()))
-    assert list(numbers["motor_turn_rad"]) == list(arm.motors.names)
+    assert list(numbers["motor_yield_rad"]) == list(arm.motors.names)
     rigid = cdsm.equilibrium(*pulled(spooled()), DOWN)
     assert not rigid.motor_turns.any()
     assert "motors yield" not in str(rigid)

@@ -21,10 +21,10 @@ def pairs(arm: cdsm.Manipulator, stiffness: float = np.inf) -> list[cdsm.Motor]:
 
 
 def spooled(
-    stiffness: float = np.inf, elasticity: cdsm.Elasticity = presets.STRAND_1X19, lead: float = 0.3
+    stiffness: float = np.inf, elasticity: cdsm.Elasticity = presets.STRAND_1X19, **sizes: float
 ) -> cdsm.Manipulator:
-    """README's arm with the eight motors of :func:`pairs`."""
-    arm = cdsm.Manipulator(readme_geometry(lead=lead), elasticity)
+    """README's arm, or one of other ``sizes``, with the eight motors of :func:`pairs`."""
+    arm = cdsm.Manipulator(readme_geometry(**sizes), elasticity)
     return arm.with_motors(pairs(arm, stiffness))
 
 
