@@ -398,7 +398,7 @@ class Manipulator(ComputedArm):
             >>> assembly = arm.assemble(straight, cdsm.distribute_tension(straight, minimum=60.0))
             >>> wire = assembly.missing_wire(arm.at([0.1] * 10))
             >>> (1e3 * wire[:3]).round(2).tolist()
-            [-1.0, -1.0, 0.0]
+            [0.5, 0.5, 0.0]
         """
         if instance("pose", pose, Posture).arm is not self and pose.arm != self:
             raise InvalidInput("pose", "is of another arm; take arm.at(q).")
