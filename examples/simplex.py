@@ -2,9 +2,10 @@
 
 In a snake arm the tension itself carries 1 or 2 % of the stiffness, here four fifths. It was built
 and measured by Feron, Rhode-Barbarigos and Latteur, *J. Struct. Eng.* 149(7), 2023.
-
-    python examples/simplex.py [FOLDER]
 """
+
+import sys
+from pathlib import Path
 
 import numpy as np
 
@@ -32,15 +33,19 @@ def active_share(rest: Equilibrium) -> float:
     return float(active / (shape @ K.joint @ shape))
 
 
-def main() -> None:
-    """Print tensions and frequencies beside those of the paper."""
+def main(folder: Path) -> None:
+    """Print tensions and frequencies beside those of the paper, and draw the simplex."""
     rest = at_rest()
-    horizontal, diagonal, strut = rest.tension[0], rest.tension[6], rest.tension[9]
-    print(f"strut {-strut:.0f} N, horizontal cable {horizontal:.0f} N, diagonal {diagonal:.0f} N")
     first, second = cdsm.modes(rest.stiffness).frequencies[:2]
-    print(f"lowest mode {first:.3f} Hz (computed there: 2.166 Hz), the next {second:.1f} Hz")
-    print(f"{100.0 * active_share(rest):.0f} % of the stiffness of the lowest mode is active")
+    print("                               cdsm   stated there")
+    print(f"force in a strut [N]        {rest.tension[9]:7.0f}           1500")
+    print(f"horizontal cable [N]        {rest.tension[0]:7.0f} ")
+    print(f"diagonal cable [N]          {rest.tension[6]:7.0f}")
+    print(f"lowest mode [Hz]            {first:7.3f}          2.166")
+    print(f"the next one [Hz]           {second:7.1f}")
+    print(f"active share of the lowest  {100.0 * active_share(rest):6.0f} %")
+    cdsm.plots.save_figure(rest.plot(), folder / "simplex.png")
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]) if sys.argv[1:] else Path(__file__).parent)
