@@ -69,6 +69,27 @@ class Ends(NamedTuple):
             entries=(g, m, routing.path[segment][g, m]),
         )
 
+    def repeated(self, postures: int) -> Ends:
+        """Return the ends at N postures, one posture behind the other on either side.
+
+        Their segments are the free pieces alone, G of each posture.
+        """
+        G = self.segment.size
+        T = len(self.before)
+        place = np.arange(postures)[:, None]
+        shape = (2, postures, T)
+        piece = self.piece.reshape(2, 1, T) + G * place
+        before = np.where(self.before >= 0, self.before + T * place, -1)
+        g, m, joint = self.entries
+        return Ends(
+            segment=np.arange(postures * G),
+            piece=piece.ravel(),
+            free=np.broadcast_to(self.free.reshape(2, 1, T), shape).ravel(),
+            way=np.broadcast_to(self.way.reshape(2, 1, T), shape).ravel(),
+            before=before.ravel(),
+            entries=((g + G * place).ravel(), np.tile(m, postures), np.tile(joint, postures)),
+        )
+
 
 class _Contacts(NamedTuple):
     """All 2 T contacts."""
@@ -100,7 +121,7 @@ class _Slips(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Shifts:
-    """Contacts of the T pulleys that cables touch, at a posture.
+    """Contacts of the T pulleys that cables touch, at a posture; or at several, T in all.
 
     Attributes:
         routing: Cables through sites and contacts.
@@ -113,6 +134,7 @@ class Shifts:
         arc: Wrapped length s (T,) [m].
         angle: Wrap angle Φ (T,) [rad].
         slope: tan γ of the helix (T,).
+        postures: Number N of the postures, whose contacts are those of :meth:`Ends.repeated`.
     """
 
     routing: Routing
@@ -125,6 +147,7 @@ class Shifts:
     arc: Array
     angle: Array
     slope: Array
+    postures: int = 1
 
     @cached_property
     def _contacts(self) -> _Contacts:
@@ -214,31 +237,39 @@ class Shifts:
     def _unrolled(self, kink: Array) -> tuple[Array, Array]:
         """Solve for η and σ (T, nv): on the unrolled surface the cable stays straight."""
         ends = self.ends
-        T = len(self.radius)
+        postures = self.postures
+        T = len(self.radius) // postures
         across = self._contacts.across
         N = self._pieces.compliance[ends.piece]
         length = self._pieces.length[ends.piece] * ends.free
         # ℓ bᵀ N b: 1, but for a groove at the other end of the piece; 1 on the rim
-        stiff = np.where(ends.free, length * _form(across, N, across), 1.0)
+        both = np.where(ends.free, length * _form(across, N, across), 1.0)
+        stiff = both.reshape(2, postures, T)
+        free = length.reshape(2, postures, T)
+        arc = self.arc.reshape(postures, T)
         i = np.arange(T)
-        M = np.zeros((2 * T, 2 * T))
-        M[i, i] = stiff[:T]
-        M[i, T + i] = -length[:T]
-        M[T + i, i] = stiff[T:]
-        M[T + i, T + i] = stiff[T:] * self.arc + length[T:]
+        M = np.zeros((postures, 2 * T, 2 * T))
+        M[:, i, i] = stiff[0]
+        M[:, i, T + i] = -free[0]
+        M[:, T + i, i] = stiff[1]
+        M[:, T + i, T + i] = stiff[1] * arc + free[1]
         # neighbours share a piece, and each sees the other's contact shift
-        j = np.flatnonzero(ends.before >= 0)
-        k = ends.before[j]
-        shared = length[j] * _form(across[:, T + k], N[j], across[:, j])
-        M[j, k] -= shared
-        M[j, T + k] -= shared * self.arc[k]
-        M[T + k, j] -= shared
+        every = np.flatnonzero(ends.before >= 0)
+        first = ends.before[every]
+        shared = length[every] * _form(across[:, postures * T + first], N[every], across[:, every])
+        n, j = np.divmod(every, T)
+        k = first % T
+        M[n, j, k] -= shared
+        M[n, j, T + k] -= shared * arc[n, k]
+        M[n, T + k, j] -= shared
         # nothing shifts in a groove
-        held = np.flatnonzero(np.concatenate([self.groove, self.groove]))
-        M[held] = 0.0
-        M[held, held] = 1.0
-        shifts = np.asarray(np.linalg.solve(M, -length[:, None] * kink), np.float64)
-        return shifts[:T], shifts[T:]
+        held = np.flatnonzero(np.concatenate([self.groove[:T], self.groove[:T]]))
+        M[:, held] = 0.0
+        M[:, held, held] = 1.0
+        sides = (-length[:, None] * kink).reshape(2, postures, T, -1)
+        given = sides.transpose(1, 0, 2, 3).reshape(postures, 2 * T, -1)
+        shifts = np.asarray(np.linalg.solve(M, given), np.float64)
+        return tuple(side.reshape(postures * T, -1) for side in np.split(shifts, 2, axis=1))  # type: ignore[return-value]
 
     @cached_property
     def _added(self) -> Array | None:
@@ -268,6 +299,14 @@ class Shifts:
             return 0.0
         H = np.tensordot(weight[self.ends.segment], self._added, 1)
         return np.asarray(0.5 * (H + H.T))
+
+    def hessian_of_each(self, weight: Array) -> Array | float:
+        """Compute the same (N, nv, nv) of N postures, with weights (N, G) of the free pieces."""
+        if self._added is None:
+            return 0.0
+        added = self._added.reshape(*weight.shape, *self._added.shape[1:])
+        H = np.einsum("ng,ngij->nij", weight, added)
+        return np.asarray(0.5 * (H + H.transpose(0, 2, 1)))
 
     def hessians(self, weight: Array, group: Indices, count: int) -> Array | float:
         """Compute what shifts add to the same sums of each of ``count`` groups of segments (S,)."""

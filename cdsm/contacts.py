@@ -91,20 +91,22 @@ class Contacts(NamedTuple):
 
 
 def tangent(
-    centre: Any, axis: Any, radius: float, groove: bool, point: Any, way: float
+    x: float,
+    y: float,
+    z: float,
+    a: float,
+    b: float,
+    c: float,
+    radius: float,
+    groove: bool,
+    way: float,
 ) -> tuple[float, float, float, float, float, int]:
-    """Return the tangent from a point to a pulley.
+    """Return the tangent from a point (x, y, z) to a pulley of the axis (a, b, c) through 0.
 
     ``way`` is +1 on arrival, −1 on departure. The first three numbers are the contact in the plane,
     seen from the centre; then the projected free length l and the height h [m], and the outcome.
     """
     # height above the plane of the pulley, and projection X onto it
-    a = axis[0]
-    b = axis[1]
-    c = axis[2]
-    x = point[0] - centre[0]
-    y = point[1] - centre[1]
-    z = point[2] - centre[2]
     height = x * a + y * b + z * c
     x -= height * a
     y -= height * b
@@ -136,7 +138,7 @@ def tangent(
 def wrap(
     centre: Any,
     axis: Any,
-    radius: float,
+    r: float,
     groove: bool,
     turns: int,
     before: Any,
@@ -149,40 +151,54 @@ def wrap(
     Returns the wrap angle Φ [rad], the slope tan γ of the helix, how far the contacts moved [m],
     and the outcome.
     """
-    ux, uy, uz, free_u, height_u, outcome_u = tangent(centre, axis, radius, groove, before, 1.0)
-    vx, vy, vz, free_v, height_v, outcome_v = tangent(centre, axis, radius, groove, after, -1.0)
+    cx = centre[0]
+    cy = centre[1]
+    cz = centre[2]
+    a = axis[0]
+    b = axis[1]
+    c = axis[2]
+    ux, uy, uz, free_u, height_u, outcome_u = tangent(
+        before[0] - cx, before[1] - cy, before[2] - cz, a, b, c, r, groove, 1.0
+    )
+    vx, vy, vz, free_v, height_v, outcome_v = tangent(
+        after[0] - cx, after[1] - cy, after[2] - cz, a, b, c, r, groove, -1.0
+    )
     # Φ from the arrival to the departure about the axis
-    sine = axis[0] * (uy * vz - uz * vy) + axis[1] * (uz * vx - ux * vz)
-    sine += axis[2] * (ux * vy - uy * vx)
+    sine = a * (uy * vz - uz * vy) + b * (uz * vx - ux * vz) + c * (ux * vy - uy * vx)
     angle = atan2(sine, ux * vx + uy * vy + uz * vz)
     if angle < -0.5 * pi:
         angle += 2.0 * pi
-    angle += 2.0 * pi * turns
+    if turns:
+        angle += 2.0 * pi * turns
     # a helix climbs along the axis; |Φ|, since the length of an arc is no less than zero
     slope = 0.0
-    low = 0.0
-    high = 0.0
+    x = cx + ux
+    y = cy + uy
+    z = cz + uz
+    vx += cx
+    vy += cy
+    vz += cz
     if not groove:
-        arc = radius * abs(angle)
+        arc = r * abs(angle)
         unrolled = free_u + arc + free_v
         slope = (height_v - height_u) / unrolled if unrolled > 0.0 else 0.0
         low = height_u + slope * free_u
         high = low + slope * arc
+        x += low * a
+        y += low * b
+        z += low * c
+        vx += high * a
+        vy += high * b
+        vz += high * c
     # move the contacts there
-    x = centre[0] + low * axis[0] + ux
-    y = centre[1] + low * axis[1] + uy
-    z = centre[2] + low * axis[2] + uz
     moved = abs(x - arrival[0]) + abs(y - arrival[1]) + abs(z - arrival[2])
+    moved += abs(vx - departure[0]) + abs(vy - departure[1]) + abs(vz - departure[2])
     arrival[0] = x
     arrival[1] = y
     arrival[2] = z
-    x = centre[0] + high * axis[0] + vx
-    y = centre[1] + high * axis[1] + vy
-    z = centre[2] + high * axis[2] + vz
-    moved += abs(x - departure[0]) + abs(y - departure[1]) + abs(z - departure[2])
-    departure[0] = x
-    departure[1] = y
-    departure[2] = z
+    departure[0] = vx
+    departure[1] = vy
+    departure[2] = vz
     return angle, slope, moved, outcome_u if outcome_u != TOUCHES else outcome_v
 
 
@@ -233,6 +249,11 @@ def _sweep(
     return farthest, outcome, culprit
 
 
+def _of_one(outcome: int, angle: float) -> int:
+    """Return the outcome of a pulley alone: a straight cable passes a groove at any distance."""
+    return TOUCHES if outcome == BESIDE and angle < 0.0 else outcome
+
+
 def settle_row(
     start: Any, end: Any, low: int, high: int, pulleys: Pulleys, at: Contacts
 ) -> tuple[int, int]:
@@ -256,8 +277,7 @@ def settle_row(
             departure[low],
         )
         touches[low] = angle[low] >= 0.0
-        # a straight cable passes a groove at any distance
-        return outcome if touches[low] or outcome != BESIDE else TOUCHES, low
+        return _of_one(outcome, angle[low]), low
     count = high - low
     for i in range(low, high):
         touches[i] = True
@@ -331,9 +351,25 @@ def _settle_postures(
         posture = Pulleys(centre[w], axis[w], radius, groove, turns)
         contacts = Contacts(arrival[w], departure[w], angle[w], slope[w], touches[w])
         for r in range(len(first) - 1):
-            fault, pulley = settle_row(
-                start[w, r], end[w, r], first[r], first[r + 1], posture, contacts
-            )
+            pulley = first[r]
+            if first[r + 1] - pulley == 1:  # to hand all arrays on takes three times as long
+                angle[w, pulley], slope[w, pulley], _, fault = wrap(
+                    centre[w, pulley],
+                    axis[w, pulley],
+                    radius[pulley],
+                    groove[pulley],
+                    turns[pulley],
+                    start[w, r],
+                    end[w, r],
+                    arrival[w, pulley],
+                    departure[w, pulley],
+                )
+                touches[w, pulley] = angle[w, pulley] >= 0.0
+                fault = _of_one(fault, angle[w, pulley])
+            else:
+                fault, pulley = settle_row(
+                    start[w, r], end[w, r], first[r], first[r + 1], posture, contacts
+                )
             if fault != TOUCHES:
                 outcome[w] = fault
                 culprit[w] = pulley
@@ -346,7 +382,7 @@ def _compiled() -> Callable[..., None]:
     from numba import njit
     from numba.extending import register_jitable
 
-    for function in (tangent, wrap, _after, _sweep, settle_row):
+    for function in (tangent, wrap, _after, _sweep, _of_one, settle_row):
         register_jitable(function)
     try:
         compiled: Callable[..., None] = njit(cache=True, nogil=True, error_model="numpy")(

@@ -169,13 +169,15 @@ class Wraps:
             raise self._coincident(pattern, int(spans.length.argmin()))
         # arcs: r Φ in a groove, r Φ/cos γ on a helix
         radii, *_ = self._constants
-        arcs = [
-            r * angle * math.sqrt(1.0 + slope * slope)
-            for r, angle, slope in zip(radii, contacts.angle, contacts.slope, strict=True)
-        ]
+        arcs = [r * angle for r, angle in zip(radii, contacts.angle, strict=True)]
+        if not self.all_grooved:
+            arcs = [
+                arc * math.sqrt(1.0 + slope * slope)
+                for arc, slope in zip(arcs, contacts.slope, strict=True)
+            ]
+        touching = [arcs[i] for i in pattern.pulley.tolist()]
         lengths = pattern.routing.lengths(spans.length)
-        for i, cable in zip(pattern.pulley.tolist(), pattern.cable.tolist(), strict=True):
-            lengths[cable] += arcs[i]
+        lengths = lengths + np.bincount(pattern.cable, touching, lengths.size)
         return Wrapping(
             wraps=self,
             pattern=pattern,
@@ -221,6 +223,11 @@ class Wraps:
             if outcome != TOUCHES:
                 raise self.fault(outcome, pulley)
         return contacts
+
+    @cached_property
+    def all_grooved(self) -> bool:
+        """Whether every pulley has a groove."""
+        return bool(self.groove.all())
 
     @cached_property
     def _homogeneous(self) -> Array:

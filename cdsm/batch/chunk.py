@@ -16,6 +16,7 @@ from cdsm import readings
 from cdsm.batch.quantities import READINGS, Codes, read
 from cdsm.batch.rows import (
     BodyArrays,
+    Directions,
     LoadArrays,
     PoseArrays,
     Rows,
@@ -230,12 +231,19 @@ class Chunk:
             return values
         terms = self._terms(by_all_joints, F, k, W)
         if self._rows.shifts is not None:
-            terms[:, 0] += self._rows.shifts(self._one_by_one(F), self._part)
+            terms[:, 0] += self._shifts(by_all_joints, F)
         values = dict(zip(TERMS_OF_K, terms.swapaxes(0, 1), strict=False))
         values["joint"] = terms.sum(axis=1)
         if wanted:
             self._read(values, wanted, fine, terms[fine], values["joint"][fine], at)
         return values
+
+    def _shifts(self, by_all_joints: PoseArrays, F: Array) -> Array:
+        """Return what shifts of contacts add to the active term (n, nv, nv)."""
+        assert self._rows.shifts is not None
+        at = by_all_joints
+        places = Directions(*map(self._one_by_one, (at.segment, at.motion, at.axis)))
+        return self._rows.shifts(places, self._one_by_one(F), self._part)
 
     def _allow_slack(
         self,
@@ -257,7 +265,7 @@ class Chunk:
             return
         terms = self._terms(by_all_joints, F, k, W, rows)
         if self._rows.shifts is not None:
-            terms[:, 0] += self._rows.shifts(self._one_by_one(F), self._part)[rows]
+            terms[:, 0] += self._shifts(by_all_joints, F)[rows]
         J_v = self._tip_jacobian(at)[rows, :3]
         torque = self._rows.directions @ J_v
         moves = readings.moves_tip(torque, J_v)

@@ -27,6 +27,18 @@ from cdsm.tension.solvers import NO_ARM
 CableStiffness = Callable[[Array, Array, slice], Array]
 """Stiffness (n, C) of cables of lengths L (n, C) under F (n, C) in a slice of rows; −1 outside."""
 
+
+class Directions(NamedTuple):
+    """Segments and joints in n rows."""
+
+    segment: Array  # direction, and 1/length of each segment (n, S, 4)
+    motion: Array  # d of each joint of each segment (n, S, m, 3)
+    axis: Array  # z of all joints (n, joints, 3)
+
+
+ShiftsOfRows = Callable[[Directions, Array, slice], Array]
+"""What shifts of contacts add to H_L·F (n, nv, nv) under F (n, C) in a slice of rows."""
+
 _Scalar = TypeVar("_Scalar", np.float64, np.bool_)
 
 
@@ -101,7 +113,7 @@ class RowLoads:
     points: tuple[LinkPoint, ...]
     wrenches: Array  # (1, L, 6) for all rows or (N, L, 6): force [N], then moment [N m]
 
-    def of(self, rows: Indices) -> RowLoads:
+    def of(self, rows: Indices | slice) -> RowLoads:
         """Return the loads of some rows."""
         if len(self.wrenches) == 1:
             return self
@@ -186,7 +198,7 @@ class Rows:
     check_limits: bool = True
     status: Codes | None = None
     touches: tuple[bool, ...] | None = None
-    shifts: Callable[[Array, slice], Array] | None = None
+    shifts: ShiftsOfRows | None = None
     loads: RowLoads | None = None
 
     @cached_property

@@ -6,7 +6,7 @@ the lengths that no joint changes. Rows in which other pulleys touch have other 
 solved together, pattern by pattern.
 
 Beside the plane of a pulley, contacts shift (:mod:`cdsm.contact_shifts`). What this adds to K_θ is
-computed row by row, for the rows that need it.
+computed for the rows that need it.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.batch.quantities import Codes
-from cdsm.batch.rows import BodyArrays, Rows, tables_of
+from cdsm.batch.rows import BodyArrays, Directions, Rows, ShiftsOfRows, tables_of
+from cdsm.contact_shifts import Shifts
 from cdsm.contacts import TOUCHES, Contacts, Pulleys, settle_postures, settle_row
-from cdsm.routing import Indices
+from cdsm.routing import Indices, Spans
 from cdsm.status import Status
 from cdsm.support.values import Array
 from cdsm.wraps import Pattern, Wraps
@@ -30,6 +31,24 @@ Solve = Callable[[Rows, int], tuple[dict[str, Array], Codes]]
 
 _PLAIN = 2000  # rows up to which plain Python is faster than compiling, which takes 7 s once
 _IN_PLANE = 1e-12  # sine of the angle to the plane of a groove that is rounding
+
+
+class _Touching(NamedTuple):
+    """The T pulleys that cables touch in N rows."""
+
+    radial: Array  # from the centres to the contacts (N, 2T, 3) [m]
+    axis: Array  # (N, T, 3)
+    arc: Array  # wrapped length (N, T) [m]
+    angle: Array  # wrap angle (N, T) [rad]
+    slope: Array  # of the helix (N, T)
+
+
+class _Places(NamedTuple):
+    """Where all entries and pulleys are in N rows, and where cables touch."""
+
+    entry: Array  # of all paths (N, E, 3) [m]
+    axis: Array  # of all pulleys (N, P, 3)
+    contacts: Contacts
 
 
 class _Frames(NamedTuple):
@@ -45,8 +64,10 @@ def solve_wrapped(rows: Rows, threads: int, solve: Solve) -> tuple[dict[str, Arr
     wraps = arm.wraps
     assert wraps is not None
     frames = _frames(rows)
-    centre, axis, entry = _places(wraps, frames)
-    contacts, outcome = _settle(wraps, centre, axis, entry)
+    axis = _turned(frames.rotation, wraps.row[wraps.entry], wraps.local_axis)
+    entry = frames.origin[:, wraps.row] + _turned(frames.rotation, wraps.row, wraps.point)
+    contacts, outcome = _settle(wraps, entry[:, wraps.entry], axis, entry)
+    places = _Places(entry, axis, contacts)
     status = np.zeros(len(rows.q), np.uint8) if rows.status is None else rows.status.copy()
     status[(outcome != TOUCHES) & (status == Status.OK)] = Status.COINCIDENT_SITES
     values: dict[str, Array] = {}
@@ -55,9 +76,9 @@ def solve_wrapped(rows: Rows, threads: int, solve: Solve) -> tuple[dict[str, Arr
     keys = bits.view(np.dtype((np.void, bits.shape[1]))).ravel()
     _, first, pattern_of = np.unique(keys, return_index=True, return_inverse=True)
     for k, row in enumerate(first.tolist()):
-        chosen = np.flatnonzero(pattern_of == k)
+        chosen = np.flatnonzero(pattern_of == k) if len(first) > 1 else slice(None)
         touches = tuple(contacts.touches[row].tolist())
-        part = _part(rows, chosen, touches, frames, contacts, entry, status)
+        part = _part(rows, chosen, touches, frames, places, status)
         solved, codes = solve(part, threads)
         status[chosen] = codes
         for name, value in solved.items():
@@ -86,12 +107,22 @@ def _frames(rows: Rows) -> _Frames:
     return _Frames(rotation, origin)
 
 
-def _places(wraps: Wraps, frames: _Frames) -> tuple[Array, Array, Array]:
-    """Return centres and axes of the pulleys (N, P, 3), and all entries of paths (N, E, 3)."""
-    turned = np.einsum("nexy,ey->nex", frames.rotation[:, wraps.row], wraps.point)
-    entry = frames.origin[:, wraps.row] + turned
-    axis = np.einsum("npxy,py->npx", frames.rotation[:, wraps.row[wraps.entry]], wraps.local_axis)
-    return entry[:, wraps.entry], axis, entry
+def _turned(rotation: Array, row: Indices, local: Array) -> Array:
+    """Turn vectors (E, 3) in the frames ``row`` (E,) into base axes (N, E, 3)."""
+    turned = np.empty((len(rotation), len(row), 3))
+    for frame in np.unique(row).tolist():
+        at = np.flatnonzero(row == frame)
+        turned[:, at] = local[at] @ rotation[:, frame].transpose(0, 2, 1)
+    return turned
+
+
+def _turned_back(rotation: Array, row: Indices, vectors: Array) -> Array:
+    """Turn vectors (N, E, 3) in base axes into the frames ``row`` (E,)."""
+    local = np.empty(vectors.shape)
+    for frame in np.unique(row).tolist():
+        at = np.flatnonzero(row == frame)
+        local[:, at] = vectors[:, at] @ rotation[:, frame]
+    return local
 
 
 def _settle(wraps: Wraps, centre: Array, axis: Array, entry: Array) -> tuple[Contacts, Indices]:
@@ -128,11 +159,10 @@ def _blank(count: int) -> tuple[list[float], list[float], list[bool]]:
 
 def _part(
     rows: Rows,
-    chosen: Indices,
+    chosen: Indices | slice,
     touches: tuple[bool, ...],
     frames: _Frames,
-    contacts: Contacts,
-    entry: Array,
+    places: _Places,
     status: Codes,
 ) -> Rows:
     """Return the ``chosen`` rows, in which these pulleys touch, with the contacts as sites."""
@@ -140,19 +170,22 @@ def _part(
     assert wraps is not None
     pattern = wraps.pattern(touches)
     routing = pattern.routing
-    contacts_here = Contacts(*(field[chosen] for field in contacts))
-    points = np.concatenate([entry[chosen], contacts_here.arrival, contacts_here.departure], axis=1)
-    node = points[:, pattern.source]
-    # in the frames of the links
-    apart = node - frames.origin[chosen][:, routing.row]
-    site = np.einsum("npyx,npy->npx", frames.rotation[chosen][:, routing.row], apart)
-    arcs = wraps.radius * contacts_here.angle * np.sqrt(1.0 + contacts_here.slope**2)
-    fixed = np.repeat(routing.fixed[None], len(chosen), axis=0)
-    np.add.at(fixed.T, pattern.cable, arcs[:, pattern.pulley].T)
+    pulley = pattern.pulley
+    contacts = Contacts(*(field[chosen][:, pulley] for field in places.contacts))
+    entry = places.entry[chosen]
+    count = len(entry)
+    # contacts in the frames of the links; all other sites keep their places
+    row = routing.row[pattern.contact]
+    world = np.concatenate([contacts.arrival, contacts.departure], axis=1)
+    apart = world - frames.origin[chosen][:, row]
+    site = np.repeat(routing.point[None], count, axis=0)
+    site[:, pattern.contact] = _turned_back(frames.rotation[chosen], row, apart)
+    arcs = wraps.radius[pulley] * contacts.angle * np.sqrt(1.0 + contacts.slope**2)
+    fixed = np.repeat(routing.fixed[None], count, axis=0)
+    for i, cable in enumerate(pattern.cable.tolist()):
+        fixed[:, cable] += arcs[:, i]
     dimensions = tables_of(rows.arm).dimensions._replace(site=site, fixed=fixed)
-    body = BodyArrays(
-        *(x if x is site or x is fixed else _repeated(x, len(chosen)) for x in dimensions)
-    )
+    body = BodyArrays(*(x if x is site or x is fixed else _repeated(x, count) for x in dimensions))
 
     def some(values: Array) -> Array:
         return values if len(values) == 1 < len(rows.q) else values[chosen]
@@ -168,9 +201,15 @@ def _part(
         touches=touches,
         loads=None if rows.loads is None else rows.loads.of(chosen),
     )
-    if (shifted := _shifted(wraps, pattern, node, contacts_here, frames, chosen)).any():
-        return replace(part, shifts=_shifts(part, shifted))
-    return part
+    axis = places.axis[chosen][:, pulley]
+    every = entry, places.contacts.arrival[chosen], places.contacts.departure[chosen]
+    shifted = _shifted(wraps, pattern, np.concatenate(every, axis=1), world, axis)
+    if not shifted.any():
+        return part
+    centre = entry[:, wraps.entry[pulley]]
+    radial = world - np.concatenate([centre, centre], axis=1)
+    touching = _Touching(radial, axis, arcs, contacts.angle, contacts.slope)
+    return replace(part, shifts=_shifts(part, pattern, touching, shifted))
 
 
 def _repeated(x: Array, count: int) -> Array:
@@ -178,39 +217,80 @@ def _repeated(x: Array, count: int) -> Array:
 
 
 def _shifted(
-    wraps: Wraps,
-    pattern: Pattern,
-    node: Array,
-    contacts: Contacts,
-    frames: _Frames,
-    chosen: Indices,
+    wraps: Wraps, pattern: Pattern, points: Array, contact: Array, axis: Array
 ) -> NDArray[np.bool_]:
-    """Return in which rows (N,) contacts may shift: beside a groove, or on a smooth cylinder."""
+    """Return in which rows (N,) contacts may shift: beside a groove, or on a smooth cylinder.
+
+    ``points`` are all entries, arrivals and departures; ``contact`` (N, 2T, 3) and ``axis``
+    (N, T, 3) those of pulleys that touch.
+    """
     if not wraps.groove[pattern.pulley].all():
-        return np.ones(len(node), np.bool_)
+        return np.ones(len(points), np.bool_)
     ends = pattern.ends
-    segment = ends.segment[ends.piece[ends.free]]
-    along = node[:, pattern.routing.second[segment]] - node[:, pattern.routing.first[segment]]
-    pulley = np.concatenate([pattern.pulley, pattern.pulley])[ends.free]
-    rotation = frames.rotation[chosen][:, wraps.row[wraps.entry[pulley]]]
-    axis = np.einsum("npxy,py->npx", rotation, wraps.local_axis[pulley])
-    sine = abs(np.einsum("npx,npx->np", axis, along)) / np.linalg.norm(along, axis=2)
-    return np.asarray(sine.max(axis=1, initial=0.0) > _IN_PLANE)
+    T = len(pattern.pulley)
+    some = np.flatnonzero(ends.free)
+    segment = ends.segment[ends.piece[some]]
+    far = np.where(some < T, pattern.routing.first[segment], pattern.routing.second[segment])
+    along = points[:, np.array(pattern.source)[far]] - contact[:, some]
+    height = np.einsum("npx,npx->np", axis[:, some % max(T, 1)], along)
+    length2 = np.einsum("npx,npx->np", along, along)
+    return np.asarray((height**2 > _IN_PLANE**2 * length2).any(axis=1))
 
 
-def _shifts(rows: Rows, shifted: NDArray[np.bool_]) -> Callable[[Array, slice], Array]:
+def _shifts(
+    rows: Rows, pattern: Pattern, touching: _Touching, shifted: NDArray[np.bool_]
+) -> ShiftsOfRows:
     """Return the function that computes what shifts add to H_L·F (n, nv, nv) of some rows."""
     arm = rows.arm
+    wraps = arm.wraps
+    assert wraps is not None
+    routing = pattern.routing
+    segment = pattern.ends.segment
+    pulley = pattern.pulley
+    sign = routing.sign[segment]
+    joint = np.where(sign == 0.0, 0, routing.path[segment])
 
-    def added(tension: Array, part: slice) -> Array:
+    def added(at: Directions, tension: Array, part: slice) -> Array:
         K = np.zeros((len(tension), arm.nv, arm.nv))
-        for i, row in enumerate(range(len(rows.q))[part]):
-            lost = rows.status is not None and rows.status[row] != Status.OK
-            if shifted[row] and not lost:
-                wrapping = arm.at(rows.q[row], check_limits=False).wrapping
-                assert wrapping is not None
-                weight = tension[i][wrapping.pattern.routing.cable]
-                K[i] = wrapping.shifts.hessian(weight)
+        fine = shifted[part]
+        if rows.status is not None:
+            fine = fine & (rows.status[part] == Status.OK)
+        some = np.flatnonzero(fine)
+        if not some.size:
+            return K
+        N = some.size
+
+        def one_behind_another(x: Array) -> Array:
+            """Make (3, N·n, …) of vectors (N, n, …, 3)."""
+            flat = x.reshape(-1, *x.shape[2:])
+            return np.ascontiguousarray(np.moveaxis(flat, -1, 0))
+
+        piece = at.segment[some][:, segment]
+        of_rows = np.arange(len(shifted))[part][some]
+        here = _Touching(*(x[of_rows] for x in touching))
+        spans = Spans(
+            length=1.0 / piece[:, :, 3].ravel(),
+            direction=one_behind_another(piece[:, :, :3]),
+            axis=one_behind_another(sign[:, :, None] * at.axis[some][:, joint]),
+            motion=one_behind_another(at.motion[some][:, segment]),
+            rate=np.zeros(0),
+        )
+        T = len(pulley)
+        radial = here.radial.reshape(N, 2, T, 3).transpose(3, 1, 0, 2).reshape(3, -1)
+        shifts = Shifts(
+            routing=routing,
+            spans=spans,
+            ends=pattern.ends.repeated(N),
+            radial=radial,
+            axis=one_behind_another(here.axis),
+            radius=np.tile(wraps.radius[pulley], N),
+            groove=np.tile(wraps.groove[pulley], N),
+            arc=here.arc.ravel(),
+            angle=here.angle.ravel(),
+            slope=here.slope.ravel(),
+            postures=N,
+        )
+        K[some] = shifts.hessian_of_each(tension[some][:, routing.cable[segment]])
         return K
 
     return added

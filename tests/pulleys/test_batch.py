@@ -1,5 +1,7 @@
 """Batches of arms with pulleys against single postures, in every pattern of pulleys that touch."""
 
+from dataclasses import replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -13,11 +15,25 @@ OUTPUTS = ("joint", "active", "passive", "cable_lengths", "length_jacobian", "al
 REACH = np.array([0.1, 1.2, 1.2, 1.2])
 
 
+def mixed() -> cdsm.Manipulator:
+    """The finger with a groove in every second pulley, also of those that follow each other."""
+    arm = finger(plane=False)
+    number = count()
+    cables = []
+    for cable in arm.cables:
+        path = [
+            replace(each, groove=next(number) % 2 == 0) if isinstance(each, cdsm.Pulley) else each
+            for each in cable.sites
+        ]
+        cables.append(replace(cable, sites=tuple(path)))
+    return arm.with_cables(cables)
+
+
 @pytest.mark.parametrize("compiled", [False, True])
 @pytest.mark.parametrize(
     "arm",
-    [finger(), finger(plane=False), finger(plane=False, groove=False)],
-    ids=["in the plane", "beside grooves", "smooth"],
+    [finger(), finger(plane=False), finger(plane=False, groove=False), mixed()],
+    ids=["in the plane", "beside grooves", "smooth", "mixed"],
 )
 def test_rows_are_postures(
     arm: cdsm.Manipulator, compiled: bool, monkeypatch: pytest.MonkeyPatch
