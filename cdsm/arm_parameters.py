@@ -27,15 +27,16 @@ class ArmParameters:
       law as a whole, and ``exponent`` [-] of a law :meth:`SpringLaw.power`.
     - ``bending_stiffness`` EI [N m²] of a neck, a gap of a backbone or a link that bends; its GJ
       changes in the same ratio.
+    - ``motor_stiffness`` k_m [N m/rad] of a motor that has one.
     - Of a cable: ``lead`` [m], ``hole_angle`` [rad], ``friction`` μ [-] in its holes, ``spring``
       [N/m] in series, ``rigidity`` [-], a factor on the EA of its law, ``slack`` [m] and ``gain``
       [-] of its motor, and ``phase`` [rad], which is added to its hole angle.
 
     ``"hole_radius"`` is that of all joints, ``"hole_radius@2"`` of the second one from the base.
     ``"lead"`` is that of all cables, ``"lead@2"`` of the cables that end at joint 2,
-    ``"lead@cable2_1"`` of one cable. An arm from a URDF has only friction, spring, rigidity, slack
-    and gain, of all cables or of one. A call passes names with @ in a dict:
-    ``parameters(**{"hole_radius@2": 0.025})``.
+    ``"lead@cable2_1"`` of one cable, ``"motor_stiffness@m1"`` that of one motor. An arm from a URDF
+    has only friction, spring, rigidity, slack and gain, of all cables or of one, and its motors. A
+    call passes names with @ in a dict: ``parameters(**{"hole_radius@2": 0.025})``.
 
     Attributes:
         arm: The arm; parameters that are not named keep their values.
@@ -135,8 +136,9 @@ class ArmParameters:
     def _built(self, parts: dict[PartKind, list[Any]], changed: set[PartKind]) -> Manipulator:
         """Build the arm of these parts, of which those of some kinds are changed."""
         cables = parts["cables"]
-        if changed <= {"cables"}:
-            return self.arm.with_cables(cables)
+        motors = tuple(parts["motors"])
+        if changed <= {"cables", "motors"}:
+            return self.arm.replace(cables=cables, motors=motors)
         geometry = self.arm.geometry.replace(
             joints=tuple(parts["joints"]),
             links=tuple(parts["links"]),
@@ -147,12 +149,13 @@ class ArmParameters:
             replace(cable, sites=holes_like(route, cable), lead=route.lead)
             for cable, route in zip(cables, routed, strict=True)
         ]
-        return self.arm.with_geometry(geometry, cables)
+        return self.arm.with_motors(motors).with_geometry(geometry, cables)
 
     @property
     def _parts(self) -> dict[PartKind, tuple[Any, ...]]:
         """All parts of the arm by kind; each joint has a hole radius of its own."""
         parts: dict[PartKind, tuple[Any, ...]] = {"cables": self.arm.cables}
+        parts["motors"] = self.arm.definition.motors
         if self.arm.is_serpentine:
             geometry = self.arm.geometry
             joints = zip(geometry.joints, geometry.hole_radii, strict=True)
@@ -193,6 +196,9 @@ class ArmParameters:
         names = self.arm.cables.names
         if not at:
             return [*range(len(self._parts[kind]))]
+        if kind == "motors":
+            drives = [motor.name for motor in self.arm.definition.motors]
+            return [drives.index(one_of("motor", where, drives))]
         if is_cable and (where in names or not self.arm.is_serpentine or not where.isdecimal()):
             return [names.index(one_of("cable", where, names))]
         count = len(self.arm.geometry.joints)

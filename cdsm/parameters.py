@@ -13,12 +13,13 @@ from typing import Any, Final, Literal, NamedTuple, TypeVar
 
 from cdsm.cable import Cable
 from cdsm.geometry import CableRoute, Joint, Link
+from cdsm.motors import Motor
 from cdsm.quantities import DISPLAY
 from cdsm.springs import SpringLaw
 
 _Part = TypeVar("_Part")
 
-PartKind = Literal["joints", "links", "routes", "cables"]
+PartKind = Literal["joints", "links", "routes", "cables", "motors"]
 """Parts of a geometry (joints, links, routes of cables), and the cables of an arm."""
 
 
@@ -142,6 +143,14 @@ def _turned(route: CableRoute, angle: float) -> CableRoute:
     return replace(route, angle=route.angle + angle)
 
 
+def _motor_stiffness(motor: Motor) -> float | None:
+    return motor.stiffness if math.isfinite(motor.stiffness) else None
+
+
+def _with_motor_stiffness(motor: Motor, stiffness: float) -> Motor:
+    return replace(motor, stiffness=stiffness)
+
+
 def _friction(cable: Cable) -> float:
     return max(site.friction for site in cable.sites)
 
@@ -219,5 +228,15 @@ PARAMETERS: Final[dict[str, Parameter]] = {
     ),
     "slack": attribute("cables", "slack", METRE, acts_under_load=False),
     "gain": attribute("cables", "gain", NUMBER, largest=0.5, acts_under_load=False),
+    "motor_stiffness": Parameter(
+        unit=SPRING,
+        kinds=("motors",),
+        get=_motor_stiffness,
+        set=_with_motor_stiffness,
+        lacks="no motor with a stiffness there; give cdsm.Motor(…, stiffness=)",
+        is_relative=True,
+        is_common=True,
+        largest=0.5,
+    ),
 }
 """All parameters by name; :class:`~cdsm.ArmParameters` explains them."""

@@ -90,9 +90,10 @@ class Tolerances:
 
     A source is a standard uncertainty (one sigma) as a number, a :class:`Tolerance`, or a list of
     tolerances, each for the inputs that its ``of`` names. A number for ``rigidity``,
-    ``joint_stiffness``, ``bending_stiffness`` or ``friction`` has the correlation 1, since cables
-    are of one spool, a backbone is one rod and disks are of one material; other numbers have the
-    correlation 0. ``tolerances.lead`` is the tuple of the tolerances of a source that are not zero.
+    ``joint_stiffness``, ``bending_stiffness``, ``motor_stiffness`` or ``friction`` has the
+    correlation 1, since cables are of one spool, a backbone is one rod, motors are of one kind and
+    disks of one material; other numbers have the correlation 0. ``tolerances.lead`` is the tuple of
+    the tolerances of a source that are not zero.
 
     Args:
         rigidity: EA of the law of each cable; relative [-].
@@ -107,6 +108,7 @@ class Tolerances:
         lead: Straight length of each cable before the base disk [m].
         slack: Wire that each motor takes in before its cable pulls [m].
         gain: Wire taken in per pull that each motor reports [-].
+        motor_stiffness: k_m of each motor that has one; relative [-].
         hole_radius: Distance of each hole from the axis of its link [m].
         hole_angle: Angle of each hole about the axis of its link [rad].
         disk_offset: Distance of each disk from its joint [m]; place of a backbone's disk.

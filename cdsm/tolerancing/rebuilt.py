@@ -24,9 +24,10 @@ def labels_of(arm: Manipulator, source: str) -> tuple[str, ...]:
     Raises InvalidInput if there are none.
     """
     places = ArmParameters(arm, (source,)).places(source)
-    names = arm.cables.names
+    named = {"motors": [motor.name for motor in arm.definition.motors]}
+    named |= {kind: [*arm.cables.names] for kind in ("routes", "cables")}
     return tuple(
-        names[i] if kind in ("routes", "cables") else f"{kind.removesuffix('s')}{i + 1}"
+        named[kind][i] if kind in named else f"{kind.removesuffix('s')}{i + 1}"
         for kind, i in places
     )
 

@@ -16,6 +16,15 @@ GEOMETRY = readme_geometry(joints=2, hole_radius=[0.025, 0.02])
 ARM = cdsm.Manipulator(GEOMETRY, cdsm.LinearElasticity(48e3), gravity="-y").with_friction(0.1)
 
 
+DRIVEN = ARM.with_motors(
+    [
+        cdsm.Motor("m1", {"cable1_1": 0.012, "cable1_2": -0.012}, stiffness=20.0),
+        cdsm.Motor("m2", {"cable2_1": 0.012, "cable2_2": -0.012}, stiffness=30.0),
+        cdsm.Motor("m3", {"cable2_3": 0.012}),
+    ]
+)
+
+
 def test_nothing_changed_is_the_same_arm() -> None:
     every = ("friction", "rigidity", "lead", "hole_radius@1", "hole_radius@2", "disk_offset@1")
     parameters = cdsm.ArmParameters(ARM, (*every, "link_length", "link_mass@2"))
@@ -30,7 +39,9 @@ def test_nothing_changed_is_the_same_arm() -> None:
 def test_an_arm_with_its_own_numbers_is_equal(name: str, where: str) -> None:
     """Also where joints have numbers of their own: equal radii are one radius of the geometry."""
     at = where if where != "@cable2_1" or "cables" in PARAMETERS[name].kinds else "@1"
-    arm = {"bending_stiffness": SPRUNG, "exponent": WITH_LAWS}.get(name, ARM)
+    at = at.replace("@", "@m") if "motors" in PARAMETERS[name].kinds else at
+    special = {"bending_stiffness": SPRUNG, "exponent": WITH_LAWS, "motor_stiffness": DRIVEN}
+    arm = special.get(name, ARM)
     arm = arm.with_cables([replace(cable, series_stiffness=2e4) for cable in arm.cables])
     parameters = cdsm.ArmParameters(arm, (f"{name}{at}",))
     if len({*parameters.values(f"{name}{at}")}) == 1:
