@@ -6,7 +6,7 @@ import csv
 import json
 import math
 import shlex
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import zip_longest
 from pathlib import Path
 from textwrap import wrap
@@ -21,6 +21,7 @@ from cdsm.cli.output import answer, misuse, write, write_picture
 
 if TYPE_CHECKING:
     from cdsm.identification import Identification
+    from cdsm.identification.least_squares import Test
 
 _TEST = "Tensile test, a line per reading. Columns: displacement (or extension, stroke, strain, …) "
 _TEST += "[mm] and force (or load) [N], in the order recorded; as examples/data/TEST.csv. With "
@@ -127,10 +128,15 @@ Limits = tuple[float, float]
 
 _LOOPS = "A line per reading. Columns: test; joints [deg]; direction (such as -z); force [N]; "
 _LOOPS += "displacement [mm] along it (or x, y, z); minimum [N], or a tension per cable [N]; as "
-_LOOPS += "examples/data/LOOPS.csv."
+_LOOPS += (
+    "examples/data/LOOPS.csv. Without a column test, positions of the tip: x, y, z [mm]; pull "
+)
+_LOOPS += "[mm] or tension [N] per cable; as examples/data/TIPS.csv, PULLS.csv."
 _FREE = "Parameter to find; repeat it: friction; rigidity (factor on EA); spring [N/mm] in series; "
 _FREE += "lead, hole_radius, disk_offset, link_length [mm]; link_mass [g]; joint_stiffness, "
-_FREE += "bending_stiffness [N m/rad, N m²]. Default bounds: half to "
+_FREE += (
+    "bending_stiffness [N m/rad, N m²]; of pulls also slack [mm], gain. Default bounds: half to "
+)
 _FREE += "twice the arm's own value; friction 0 to 1."
 _START = (
     "Value from which to seek a parameter, in its unit; repeat it. Default: that of the arm; of a "
@@ -140,7 +146,7 @@ _START += "friction of 0, 0.1."
 
 def identify_parameters(
     arm: options.ArmArgument,
-    loops: Annotated[Path, typer.Argument(metavar="LOOPS.csv", help=_LOOPS)],
+    readings: Annotated[Path, typer.Argument(metavar="LOOPS.csv|TIPS.csv", help=_LOOPS)],
     free: Annotated[list[str], opt(_FREE, "NAME[@JOINT][=LOW:HIGH]")],
     displacement_std: Annotated[float, opt("Standard deviation of a reading.", "MM")],
     start: Annotated[list[str] | None, opt(_START, "NAME[@JOINT]=VALUE")] = None,
@@ -152,22 +158,25 @@ def identify_parameters(
     figure: options.FigureOption = None,
     as_json: options.JsonOption = False,
 ) -> int:
-    """Find friction, rigidity and dimensions from weight tests.
+    """Find friction, rigidity and dimensions from weight tests or positions of the tip.
 
-    A test applies a force along a direction and removes it, with locked motors. The answer gives
+    A test applies a force along a direction and removes it, with locked motors; a position of the
+    tip belongs to what the motors pulled: after re-stringing, slack and gain. The answer gives
     each parameter with a 95 % interval, and warns of parameters that the tests do not determine.
     """
     from cdsm.arm_parameters import ArmParameters, parameter_of
     from cdsm.identification.experiment_plan import plan_tests
+    from cdsm.support.tables import column_names
 
     described = options.load_arm(arm, changes)
     ranges = _ranges(free)
+    by_weights = "test" in column_names(readings)
     for name in ranges:
-        if not parameter_of(name).acts_under_load:
-            problem = (
-                "changes no weight test: positions of the tip show it (in Python, TipPosition)."
-            )
-            raise misuse("--free", f"{name} {problem}")
+        if by_weights and not parameter_of(name).acts_under_load:
+            raise misuse("--free", f"{name} changes no weight test: positions of the tip show it.")
+    for option, value in (("--minimum", minimum), ("--tests", tests)):
+        if value is not None and not by_weights:
+            raise misuse(option, "is for weight tests; these are positions of the tip.")
     parameters = ArmParameters(described, tuple(ranges))
     units = {name: parameters.unit(name) for name in ranges}
     labels = {f"{name} [{unit}]" if unit else name: name for name, (unit, _) in units.items()}
@@ -177,16 +186,21 @@ def identify_parameters(
     def model_of(**values: float) -> cdsm.Manipulator:
         return parameters(**{labels[at]: x * units[labels[at]][1] for at, x in values.items()})
 
-    read = cdsm.read_loops(
-        loops, described, displacement_std=1e-3 * displacement_std, minimum=minimum
-    )
-    if tests is not None:
-        expected = {label: (present | starts)[name] for label, name in labels.items()}
-        planned = plan_tests(model_of, expected, read, tests=tests)
-        write_picture(figure, planned.plot)
-        return answer(as_json, planned.to_dict(), planned)
-    if any(loop.displacements is None for loop in read):
-        raise cdsm.FileError(loops, "has no readings: no column displacement [mm], or x, y, z.")
+    std = 1e-3 * displacement_std
+    read: Sequence[Test]
+    if by_weights:
+        loops = cdsm.read_loops(readings, described, displacement_std=std, minimum=minimum)
+        if tests is not None:
+            expected = {label: (present | starts)[name] for label, name in labels.items()}
+            planned = plan_tests(model_of, expected, loops, tests=tests)
+            write_picture(figure, planned.plot)
+            return answer(as_json, planned.to_dict(), planned)
+        if any(loop.displacements is None for loop in loops):
+            problem = "has no readings: no column displacement [mm], or x, y, z."
+            raise cdsm.FileError(readings, problem)
+        read = loops
+    else:
+        read = cdsm.read_tip_positions(readings, described, std=std)
     bounds = {name: ranges[name] or _usual(name, present[name]) for name in ranges}
     for name, (low, high) in bounds.items():
         size = units[name][1]
@@ -200,7 +214,7 @@ def identify_parameters(
         start={label: starts[name] for label, name in labels.items() if name in starts},
     )
     write_picture(figure, identification.plot)
-    command = ["cdsm", "identify", str(arm), str(loops)]
+    command = ["cdsm", "identify", str(arm), str(readings)]
     for change in changes or ():
         command += ["--set", change]
     command += [] if minimum is None else ["--minimum", f"{minimum:g}"]

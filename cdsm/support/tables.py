@@ -97,6 +97,12 @@ def name_and_unit(cell: str) -> tuple[str, str]:
     return name.strip(), unit.rstrip(" )]").strip()
 
 
+def column_names(path: str | os.PathLike[str]) -> list[str]:
+    """Return the names of the columns of a CSV file, without their units."""
+    table = read_table(path, ",;\t", rank=_cells_of_header)
+    return [name_and_unit(cell)[0] for cell in table.header] if table.rows else []
+
+
 class Columns:
     """Columns of a CSV file: a header of names with units, such as ``force [N]``, then rows.
 

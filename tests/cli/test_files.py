@@ -30,7 +30,7 @@ def test_each_sample_is_read_by_the_command_that_names_it(tmp_path: Path) -> Non
     assert len(told(*plan, SAMPLES / "PATH.csv")["tensions_N"]) == 5
     help_texts = "".join(call(name, "--help").output for name in READERS)
     for sample in SAMPLES.glob("*.csv"):
-        assert sample.name in help_texts or sample.name == "TIPS.csv"
+        assert sample.name in help_texts
 
 
 def test_load_cells_are_read_with_their_angles(tmp_path: Path) -> None:
@@ -55,6 +55,57 @@ def test_load_cells_are_read_with_their_angles(tmp_path: Path) -> None:
     twice = call("estimate", ARM, file, *std, "--link", "tool0", "--link", "tool0=moment")
     assert twice.exit_code == 2
     assert "is given twice" in twice.stderr
+
+
+HINGE = """
+wire = 2e4
+[hinged]
+joints = 1
+twist = 0.0
+cables_per_joint = 2
+link_length = 0.1
+base_length = 0.02
+disk_offset = 0.01
+hole_radius = 0.02
+link_mass = 0.05
+lead = 0.3
+joint_stiffness = 1.5
+"""
+
+
+def test_pulls_after_re_stringing_give_slack_and_gain(tmp_path: Path) -> None:
+    file, pulls = tmp_path / "arm.toml", tmp_path / "PULLS.csv"
+    file.write_text(HINGE, encoding="utf-8")
+    arm = cdsm.Manipulator.read(file)
+    truth = {"slack@cable1_1": 2.1e-3, "gain": 1.05}
+    strung = cdsm.ArmParameters(arm, (*truth,))(**truth)
+    rows = ["cable1_1 [mm],z [mm]"]
+    for pull, noise in ((4.0, 0.01), (6.0, -0.02), (8.0, 0.01)):
+        z = cdsm.forward_statics(strung, pull={"cable1_1": 1e-3 * pull}).pose.tip[2, 3]
+        rows.append(f"{pull},{1e3 * z + noise}")
+    pulls.write_text("\n".join(rows), encoding="utf-8")
+    free = ("--free", "slack@cable1_1=0:5", "--free", "gain=0.8:1.2")
+    words = ("identify", file, pulls, "--displacement-std", 0.02, *free)
+    found = told(*words, code=3)  # it warns: both are correlated
+    assert "correlated" in found["warnings"][0]
+    slack, gain = found["values_own_unit"]
+    assert abs(slack - 2.1) < 2.0 * found["std_own_unit"][0] < 0.1
+    assert abs(gain - 1.05) < 2.0 * found["std_own_unit"][1] < 0.02
+    refused = call(*words, "--minimum", 5)
+    assert refused.exit_code == 2
+    assert "is for weight tests" in refused.stderr
+    loops = ("identify", ARM, SAMPLES / "LOOPS.csv", "--displacement-std", 0.01)
+    weights = call(*loops, "--free", "slack=0:5")
+    assert "slack changes no weight test: positions of the tip show it." in weights.stderr
+
+
+@pytest.mark.long
+def test_sample_of_pulls_is_read_by_the_command_of_its_page() -> None:
+    free = [f"slack@cable20_{i}=0:5" for i in (1, 2, 3)] + ["gain=0.8:1.2"]
+    words = [word for name in free for word in ("--free", name)]
+    file = EXAMPLES / "backbone.toml"
+    found = told("identify", file, SAMPLES / "PULLS.csv", "--displacement-std", 0.2, *words)
+    np.testing.assert_allclose(found["values_own_unit"], [2.1, 0.4, 1.3, 1.05], rtol=0.02)
 
 
 @pytest.mark.parametrize(
