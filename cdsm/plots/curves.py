@@ -19,6 +19,7 @@ from cdsm.plots.style import MM, N_PER_MM, Panels
 from cdsm.posture import Posture
 from cdsm.quantities import QUANTITIES, display_of, si_of
 from cdsm.statics.buckling import critical_tension
+from cdsm.statics.hung_loads import total_force
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import one_unit, plural
 from cdsm.support.status import check_sweep
@@ -341,14 +342,15 @@ def plot_weight_test(test: WeightTest, ax: Axes | None = None, *, title: str | N
     panel.plot(*curve, "-", color=style.BLUE, lw=1.4, gid="curve")
     panel.plot(moved, loads, ".", color=style.BLUE, ms=3.0, gid="test")
     panel.margins(x=0.08)
-    along = f"displacement of the tip along {style.direction_name(u)} [mm]"
+    what = test.point.link if test.point else "the tip"
+    along = f"displacement of {what} along {style.direction_name(u)} [mm]"
     panel.set(xlabel=along, ylabel="weight [N]")
     events = [
         _Mark(float(displacement), event.load, event.kind, str(event))
         for event, displacement in zip(test.events, bends, strict=True)
     ]
     _draw_events(panel, events)
-    question = f"how far does {force:.4g} N move its tip?"
+    question = f"how far does {force:.4g} N move {test.point.link if test.point else 'its tip'}?"
     if test.left_reference:
         question += " It left its reference before the weight"
     style.set_title(panel, title, f"{test.unloaded.pose.arm.name}: {question}")
@@ -361,6 +363,9 @@ def plot_load_history(
 ) -> Axes:
     """Plot the force [N] over the displacement of the tip [mm], both along the largest force.
 
+    If all loads act on one link, the displacement is that of its point; of loads at several places
+    the force is the sum.
+
     The area of the last closed cycle is filled: the work lost to friction. The first hole that
     slides, and the first one after the force turned back, have marks. Without forces, the three
     displacements are drawn over the numbers of the loads.
@@ -369,8 +374,9 @@ def plot_load_history(
     name = history.reference.arm.name
     holes = plural(len(history.holes), "hole")
     lost = 1e3 * float(history.dissipated.sum())
-    forces = np.vstack([history.reference_wrench, history.wrenches])[:, :3]
-    displacements = MM * np.vstack([np.zeros(3), history.displacement])
+    forces = np.vstack([total_force(history.reference_applied), history.forces])
+    what, displacement = history.read
+    displacements = MM * np.vstack([np.zeros(3), displacement])
     size = np.linalg.norm(forces, axis=1)
     if not size.any():
         number = np.append(-1, history.load)
@@ -379,7 +385,7 @@ def plot_load_history(
             panel.plot(number, values, ".-", color=color, lw=0.9, label=axis, gid=f"tip:{axis}")
         panel.set(xlabel="number of the load (−1: reference)", ylabel="displacement [mm]")
         panel.legend()
-        style.set_title(panel, title, f"{name}: where does its tip go?")
+        style.set_title(panel, title, f"{name}: where does its {what} go?")
         return panel
     u = forces[size.argmax()] / size.max()
     force = forces @ u
@@ -397,7 +403,8 @@ def plot_load_history(
         words, (0.03, 0.97), xycoords="axes fraction", va="top", fontsize=7, color=style.BLUE
     )
     panel.margins(0.08)
-    along = f"displacement along {style.direction_name(u)} [mm]"
+    of = "" if what == "tip" else f" of {what}"
+    along = f"displacement{of} along {style.direction_name(u)} [mm]"
     panel.set(xlabel=along, ylabel="force [N]")
     _draw_events(panel, list(_slips(history, force, moved)), lowest=True)
     style.set_title(panel, title, f"{name}: what does friction take?")

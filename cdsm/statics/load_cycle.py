@@ -12,13 +12,14 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.applied import Applied, tip_part
-from cdsm.errors import InvalidInput
+from cdsm.applied import Applied, as_loads, tip_part
+from cdsm.errors import InvalidInput, listed
 from cdsm.friction.capstan import assemble_segments
 from cdsm.loads import LoadsLike, has_loads, loads_of
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
+from cdsm.statics.hung_loads import HungLoad, hung_loads, total_force
 from cdsm.statics.quasi_static import (
     NO_PATH,
     Action,
@@ -28,7 +29,7 @@ from cdsm.statics.quasi_static import (
 )
 from cdsm.stiffness_matrix import FrictionState, Stiffness, checked_tension
 from cdsm.support.files import write_file
-from cdsm.support.format import without_rounding
+from cdsm.support.format import merged, prepare_json, without_rounding
 from cdsm.support.progress import show_progress
 from cdsm.support.result import AXIS_NAMES, Result, data_frame, quantity, unit
 from cdsm.support.validation import WRENCH, instance, number_array, whole_number
@@ -55,7 +56,8 @@ class LoadHistory(Result, Plotted):
         reference: Posture at which the motors were locked.
         reference_tension: F (C,) [N] at the reference, the same in all segments of a cable; if the
             cycle goes on from a rest with friction, F at the motors.
-        reference_wrench: W at the reference (6,): force [N], then moment [N m].
+        reference_wrench: W at the tip at the reference (6,): force [N], then moment [N m].
+        reference_applied: What acts at the reference: W (6,) at the tip, or loads on links.
         load: Number of each load (n,), from 0: its row in ``wrenches``.
         wrenches: W of what acts at the tip at each load (n, 6): force [N], then moment [N m].
         applied: What acts at each load (n): W (6,) at the tip, or loads on links.
@@ -81,6 +83,7 @@ class LoadHistory(Result, Plotted):
     reference: Posture
     reference_tension: Array = field(metadata=unit("N", "cable"))
     reference_wrench: Array = field(metadata=unit("N and N m", "component"))
+    reference_applied: Applied
     load: NDArray[np.int_] = field(metadata=unit("1", "load"))
     wrenches: Array = field(metadata=unit("N and N m", "load", "component"))
     applied: tuple[Applied, ...]
@@ -108,6 +111,32 @@ class LoadHistory(Result, Plotted):
     def displacement(self) -> Array:
         """Displacement of the tip from the reference at each load (n, 3) [m]."""
         return frozen(self.tip - self.reference.tip[:3, 3])
+
+    @cached_property
+    def on_links(self) -> tuple[HungLoad, ...]:
+        """Loads on links: their ``point``, ``wrenches`` (n, 6) and its ``displacement`` (n, 3) [m].
+
+        Empty if all loads act at the tip.
+        """
+        poses = [self.pose(k) for k in self.load.tolist()] if self._has_links else []
+        return hung_loads(self.reference, self.applied, poses)
+
+    @property
+    def forces(self) -> Array:
+        """Sum of all forces at each load (n, 3) [N]."""
+        return np.array([total_force(applied) for applied in self.applied])
+
+    @property
+    def read(self) -> tuple[str, Array]:
+        """What is shown to move: the link of the only load, or the tip; its displacement (n, 3)."""
+        hung = self.on_links
+        if len(hung) == 1 and not self.wrenches.any():
+            return hung[0].point.link, hung[0].displacement
+        return "tip", self.displacement
+
+    @property
+    def _has_links(self) -> bool:
+        return any(as_loads(applied).on_links for applied in self.applied)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -154,6 +183,7 @@ class LoadHistory(Result, Plotted):
     def write_loop(self, path: str | os.PathLike[str]) -> Path:
         """Write force, displacement, number of sliding holes and lost work as CSV; return the path.
 
+        Forces and displacements are those at the tip; more columns have those of loads on links.
         One row per load; :meth:`write` writes all states. Raises CdsmError without pandas, and
         FileError if the file cannot be written.
         """
@@ -162,28 +192,44 @@ class LoadHistory(Result, Plotted):
             columns[f"force {axis} [N]"] = self.wrenches[:, i]
         for i, axis in enumerate(AXIS_NAMES):
             columns[f"displacement {axis} [m]"] = self.displacement[:, i]
+        for k, hung in enumerate(self.on_links, start=1):
+            where = f"of load {k} on {hung.point.link}"
+            for i, axis in enumerate(AXIS_NAMES):
+                columns[f"force {axis} {where} [N]"] = hung.wrenches[:, i]
+            for i, axis in enumerate(AXIS_NAMES):
+                columns[f"displacement {axis} {where} [m]"] = hung.displacement[:, i]
         columns["sliding holes"] = np.count_nonzero(self.sliding, axis=1)
         columns["dissipated [J]"] = self.dissipated
         return write_file(path, data_frame(columns, "load", self.load).to_csv)
 
     def __str__(self) -> str:
-        rows = [
-            f"{'load':>5}{'force [N]':>35}{'tip moved by [mm]':>30}{'sliding':>9}{'lost [mJ]':>12}"
-        ]
+        what, displacement = self.read
+        moved_by = f"{what} moved by [mm]"
+        several = len(self.on_links) > 1 or (self._has_links and what == "tip")
+        force_of = "sum of forces [N]" if several else "force [N]"
+        rows = [f"{'load':>5}{force_of:>35}{moved_by:>30}{'sliding':>9}{'lost [mJ]':>12}"]
         count = len(self.load)
-        moves = without_rounding(self.displacement)
+        moves = without_rounding(displacement)
+        forces = self.forces
         for k in range(count):
             if count > _SHOWN and _SHOWN // 2 <= k < count - _SHOWN // 2:
                 rows += [f"{'…':>5}"] * (k == _SHOWN // 2)
                 continue
-            force = "".join(f"{f:>z11.4g}" for f in self.wrenches[k, :3])
+            force = "".join(f"{f:>z11.4g}" for f in forces[k])
             moved = "".join(f"{1000.0 * x:>z10.4f}" for x in moves[k])
             slide = np.count_nonzero(self.sliding[k])
             lost = 1000.0 * self.dissipated[k]
             rows.append(f"{k:>5}  {force}{moved}{slide:>9}{lost:>12.4g}")
         lost = 1000.0 * self.dissipated.sum()
+        links = [hung.point.link for hung in self.on_links]
+        rows += [f"loads on {listed(links)}"] * several
         rows.append(f"{self.sliding.shape[1]} holes; in all {lost:.4g} mJ lost in the holes")
         return "\n".join(rows)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return all numbers in SI for JSON, units in the keys; ``loads`` are those on links."""
+        loads = [hung.to_dict() for hung in self.on_links]
+        return merged(super().to_dict(), prepare_json({"loads": loads} if loads else {}))
 
     def _labels(self) -> dict[str, Sequence[object]]:
         return {**super()._labels(), "hole": self.holes, "segment": self.segment_names}
@@ -364,6 +410,7 @@ def approach(
         reference=pose,
         reference_tension=arm.tension,
         reference_wrench=tip_part(start.load.wrench),
+        reference_applied=start.load.wrench,
         load=frozen(np.arange(len(goals))),
         wrenches=frozen(np.array([tip_part(goal.wrench) for goal in goals])),
         applied=tuple(goal.wrench for goal in goals),

@@ -213,6 +213,7 @@ class WeightTest(Result, Plotted):
             f"stiffness along the force: measured {stiffness_text(self.stiffness)}, "
             f"linear {stiffness_text(self.tangent)}",
             f"(linear is {model}; measured the secant over this weight)",
+            *([f"weight on {self.point.link}, read there"] if self.point else []),
             *events_text(self.events),
             *self._about_friction(),
         ]

@@ -1,6 +1,8 @@
 """Loads on any links: torque, stiffness, balance and readings where they hang."""
 
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -411,3 +413,43 @@ def test_what_takes_only_a_wrench_at_the_tip_says_so() -> None:
         _ = held.wrench
     with pytest.raises(cdsm.InvalidInput, match="point: is a point of a link"):
         cdsm.stiffness(pose, tension).along("z", point=(0.0, 0.0, 0.0))
+
+
+def test_a_history_of_loads_on_a_link_shows_force_and_place(tmp_path: Path) -> None:
+    arm = universal().with_friction(0.1)
+    pose = arm.at(Q)
+    tension = cdsm.distribute_tension(pose, 30.0)
+    down = np.outer([-2.0, -4.0, -2.0, 0.0], [0, 0, 1, 0, 0, 0])
+    history = cdsm.load_cycle(pose, tension, {"link2": down})
+    (hung,) = history.on_links
+    place = pose.link_pose("link2")[:3, 3]
+    for k in range(4):
+        moved = history.pose(k).link_pose("link2")[:3, 3] - place
+        np.testing.assert_allclose(hung.displacement[k], moved, atol=1e-15)
+    np.testing.assert_array_equal(hung.wrenches, down)
+    rows = str(history).splitlines()
+    assert "link2 moved by [mm]" in rows[0]
+    assert rows[2].split()[3] == "-4"
+    assert float(rows[2].split()[6]) == pytest.approx(1e3 * hung.displacement[1, 2], abs=1e-4)
+    told: Any = history.to_dict()["loads"]
+    assert told[0]["link"] == "link2"
+    np.testing.assert_allclose(told[0]["displacement_m"], hung.displacement)
+    lines = history.write_loop(tmp_path / "loop.csv").read_text().splitlines()
+    column = lines[0].split(",").index("force z of load 1 on link2 [N]")
+    assert [float(line.split(",")[column]) for line in lines[1:]] == [-2.0, -4.0, -2.0, 0.0]
+    panel = history.plot()
+    assert panel.get_xlabel() == "displacement of link2 along −z [mm]"
+    (loop,) = [line for line in panel.lines if line.get_gid() == "loop"]
+    np.testing.assert_allclose(loop.get_ydata(), [0.0, 2.0, 4.0, 2.0, 0.0])
+    np.testing.assert_allclose(
+        np.asarray(loop.get_xdata())[1:], -1e3 * hung.displacement[:, 2], atol=1e-12
+    )
+    both = cdsm.load_cycle(pose, tension, {"link2": down, "link3": down})
+    text = str(both)
+    assert "sum of forces [N]" in text
+    assert "tip moved by [mm]" in text
+    assert "loads on link2, link3" in text
+    assert both.forces[1].tolist() == [0.0, 0.0, -8.0]
+    test = cdsm.weight_test(pose, tension, [0, 0, -2.0], link="link2")
+    assert "weight on link2, read there" in str(test)
+    assert test.plot().get_xlabel() == "displacement of link2 along −z [mm]"

@@ -1,12 +1,16 @@
 """Forward statics with friction in the holes: the rest depends on the path, which is followed."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import cdsm
+from cdsm.cli import app
 from cdsm.support.values import Array
+from cdsm.view.state import Setting, show
 from tests.validation import rod as measured
 
 THREE = (0.0, 2.094, 4.189)
@@ -178,3 +182,28 @@ def test_what_friction_cannot_answer_is_refused() -> None:
     pose = cdsm.forward_statics(arm, tension=[1.0], friction=False, start=np.zeros(arm.nv)).pose
     assert "without the friction" in str(cdsm.equilibrium(pose, [1.0]))
     assert "without the friction" in str(cdsm.critical_load(pose, [0.0, 0.0, -1.0, 0, 0, 0]))
+
+
+def test_commands_and_the_view_name_the_path(tmp_path: Path) -> None:
+    """Print and JSON of --tension and --pull, of stiffness and weigh, and the page of the view."""
+    sentence = "with friction: pulled from slack in 8 steps; "
+    motors = {"--tension": ("force", "2,1,1.5"), "--pull": ("position", "6,-9,2")}
+    load = ["--load", "0,0.01,0"]
+    for option, printed, told in (
+        ("--tension", ["stiffness"], ["weigh", *load]),
+        ("--pull", ["weigh", *load], ["stiffness"]),
+    ):
+        control, value = motors[option]
+        arm = rod(0.1, hole_angles=THREE, control=control, EA=2e4)
+        at = [str(arm.write(tmp_path / f"{control}.toml")), option, value]
+        shown = CliRunner().invoke(app, [printed[0], *at, *printed[1:]]).output
+        assert sentence in " ".join(shown.split()), shown
+        numbers = json.loads(CliRunner().invoke(app, [*told[:1], *at, *told[1:], "--json"]).stdout)
+        history = numbers["rest"]["history"] if "rest" in numbers else numbers["history"]
+        assert history.startswith(sentence)
+        assert history.endswith("another history ends elsewhere")
+    pulled = Setting(
+        q=np.zeros(arm.nv), minimum=0.0, force=np.zeros(3), pull=np.array([6e-3, -9e-3, 2e-3])
+    )
+    assert sentence in show(arm, pulled).problem
+    assert "with friction" not in show(arm.with_friction(0.0), pulled).problem
