@@ -68,6 +68,38 @@ def test_stiffness_beats_differences(many: bool, clock: Clock | None) -> None:
         clock.race(what, differences, one.stiffness, least=200.0)
 
 
+def test_ten_loads_on_links_cost_a_third_more_than_one_at_the_tip(clock: Clock | None) -> None:
+    one = problem(20, 1)
+    pose = one.arm.at(one.q[0])
+    links = [f"link{k}" for k in range(2, 21, 2)]
+    ten = [cdsm.Load(link, tuple(WRENCH[:3]), point=(0.01, 0.0, 0.005)) for link in links]
+
+    def loaded() -> cdsm.Stiffness:
+        return cdsm.stiffness(one.arm.at(one.q[0]), one.tension[0], wrench=ten)
+
+    parts = [cdsm.stiffness(pose, one.tension[0], wrench=load).load for load in ten]
+    np.testing.assert_allclose(loaded().load, sum(parts), atol=1e-13)
+    if clock:
+        what = "posture + stiffness, n = 20: cost of ten loads on links over one at the tip"
+        clock.race(what, loaded, one.stiffness, most=1.3, slow_repeat=50)
+
+
+def test_a_batch_with_loads_on_links_costs_a_third_more(clock: Clock | None) -> None:
+    many = problem(5)
+    hung = {"link2": WRENCH * [1, 1, 1, 0, 0, 0], "link3": np.tile(WRENCH, (ROWS, 1))}
+
+    def batch(wrench: Any) -> Array:
+        quantities = ("joint",)
+        return cdsm.evaluate(many.arm, many.q, many.tension, wrench, quantities, threads=1)["joint"]
+
+    pose = many.arm.at(many.q[7])
+    alone = cdsm.stiffness(pose, many.tension[7], {"link2": hung["link2"], "link3": WRENCH}).joint
+    np.testing.assert_allclose(batch(hung)[7], alone, rtol=0, atol=1e-12 * abs(alone).max())
+    if clock:
+        what = "batch, n = 5: cost of loads on two links over one at the tip"
+        clock.race(what, partial(batch, hung), partial(batch, WRENCH), most=1.3, fast_repeat=1)
+
+
 @pytest.mark.speed
 @pytest.mark.parametrize("clock", ["speed"], indirect=True)
 def test_cost_grows_less_than_fourfold_from_5_to_20_joints(clock: Clock) -> None:
