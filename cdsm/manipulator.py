@@ -172,7 +172,7 @@ class Manipulator(ComputedArm):
 
         The robot is a geometry in a form of :meth:`Geometry.read`, or a table ``[urdf]`` with
         ``tip`` and ``file`` (relative to the folder of the ARM.toml) or ``text``. ``cdsm new``
-        writes a first one, with comments.
+        writes a first one, with comments. An arm without ``name`` has that of its file.
 
         Args:
             path: The file; :meth:`write` writes one.

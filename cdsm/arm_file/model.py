@@ -435,7 +435,7 @@ def read_model(
         data = _read_tables(path, changes, robot)
         described, rest = toml.split_geometry(data)
         if robot and ("urdf" not in rest or any(key in described for key in _FORMS)):
-            data = {_ROBOT: described, **rest}
+            data = {_ROBOT: toml.called(described, Path(path).stem), **rest}
         file = records.parse(ArmFile, data)
     except GeometryError as error:
         faults = listed([_placed(fault, described) for fault in error.faults], 20, LINES)

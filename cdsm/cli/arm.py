@@ -70,6 +70,7 @@ def new(
         first = max(cable.elasticity.low for cable in made.cables)  # where the law begins
         least = max(10.0, float(f"{1.05 * first:.4g}"))
         write_text(arm, template(arm.name, _number(law), least, parts))
+        made = cdsm.Manipulator.read(arm)  # which has the name of its file
     units = options.joint_scales(made)
     low = made.lower / units
     high = made.upper / units

@@ -303,14 +303,19 @@ class Geometry(Printed):
 
     @classmethod
     def from_toml(cls, text: str, source: str | None = None) -> Geometry:
-        """Build a geometry from TOML text as :meth:`read` does; errors begin with ``source``."""
+        """Build a geometry from TOML text as :meth:`read` does; errors begin with ``source``.
+
+        ``source`` is the file that the text is from.
+        """
         from cdsm.geometry import toml
 
         try:
             data, rest = toml.split_geometry(read_toml(instance("text", text, str)))
             if "urdf" in rest and not data:
                 raise GeometryError(["urdf: a robot has no geometry; use Manipulator.read"])
-            return toml.build(data or rest)
+            described = data or rest
+            stem = "" if source is None else Path(source).stem
+            return toml.build(toml.called(described, stem))
         except GeometryError as error:
             raise GeometryError(error.faults, source) from None
 
@@ -321,6 +326,7 @@ class Geometry(Printed):
         The file has the full form that :meth:`write` writes, or one table ``[universal]``,
         ``[hinged]`` or ``[backbone]`` of keywords of these methods. An arm of sections has such a
         table in each ``[[sections]]``, and at the top ``name`` and ``spread`` of :meth:`sections`.
+        A table without ``name`` has that of the file: ``SNAKE.toml`` describes ``SNAKE``.
         From an ARM.toml (see :meth:`cdsm.Manipulator.read`), only the geometry is read. Raises
         FileError, or GeometryError, which lists every fault.
         """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from inspect import signature
 from typing import Annotated, Any, Final
@@ -31,6 +32,20 @@ def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
         known.discard("cables")
     geometry = {key: value for key, value in data.items() if key in known}
     return geometry, {key: value for key, value in data.items() if key not in known}
+
+
+def called(geometry: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Return the keys of a geometry that has this ``name``, if it gives none of its own.
+
+    The full form, which :meth:`Geometry.write` writes, leaves out the usual name alone.
+    """
+    form = next((key for key in _FORMS if key in geometry), "geometry")
+    plain = re.sub(r"\W+", "_", name, flags=re.ASCII)[:64]
+    table = geometry if form == "sections" else geometry.get(form)
+    if form == "geometry" or not isinstance(table, dict) or not re.match("[A-Za-z]", plain):
+        return dict(geometry)
+    table = {"name": plain, **table}
+    return table if form == "sections" else {**geometry, form: table}
 
 
 def places_of(key: str, geometry: Mapping[str, Any]) -> list[str]:

@@ -62,8 +62,7 @@ def plot_shares(shares: Shares, ax: Axes | None = None, *, title: str | None = N
     panel.set_xlabel(f"contribution [N/mm] to {total:.4g} N/mm along {direction}")
     # to the left, where names of cables leave room
     panel.legend(loc="upper right", bbox_to_anchor=(1.0, -0.42 / style.height_of(panel)), ncols=2)
-    unstable = "" if shares.is_stable else "UNSTABLE: "
-    style.set_title(panel, title, f"{unstable}{arm.name}: what makes it stiff?")
+    style.set_title(panel, title, f"{arm.name}: what makes it stiff?", shares.is_stable)
     return panel
 
 

@@ -539,7 +539,7 @@ def color_bar_below(axs: Sequence[Axes], colors: ScalarMappable, label: str, ext
 
 
 def _legend_faults(panels: Panels, cells: list[Cells], axs_of_caller: object) -> None:
-    """Draw what the hatches mean: below a figure of this library, else in the last panel."""
+    """Draw what the hatches mean: below a figure of this library, else beside the last panel."""
     used = {words for panel in cells for words, mask in panel.faults.items() if mask.any()}
     looks = [look for look in (*_FAULTS.values(), _OTHER) if look[0] in used]
     keys = []
@@ -553,7 +553,8 @@ def _legend_faults(panels: Panels, cells: list[Cells], axs_of_caller: object) ->
             handles=keys, loc="outside lower left", ncols=4, handleheight=1.1
         )
     else:
-        panels[-1].legend(handles=keys, loc="upper right", frameon=True, handleheight=1.1)
+        look: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0)}
+        panels[-1].legend(handles=keys, handleheight=1.1, **look)  # hides no cell
 
 
 def _plot_lines(

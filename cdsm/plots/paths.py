@@ -174,8 +174,7 @@ def plot_modes(
         panel.plot([], [], color=color, label=name)
     drawing.finish(fit=ax is None)
     panel.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=3, columnspacing=1.2)
-    unstable = "" if modes.is_stable else "UNSTABLE: "
-    style.set_title(panel, title, f"{unstable}{pose.arm.name}: how does it swing? Enlarged")
+    style.set_title(panel, title, f"{pose.arm.name}: how does it swing? Enlarged", modes.is_stable)
     return panel
 
 

@@ -183,7 +183,7 @@ def plot_tracking_run(
         for at in changes:
             ax.axvline(at, color="0.3", linewidth=0.8, linestyle=":", gid="load changes")
     danger = f"{run.warnings[0].split(':')[0]}. " if run.warnings else ""
-    dotted = "; dotted: the load changes" if changes.size else ""
+    dotted = " Dotted: the load changes" if changes.size else ""
     question = f"{danger}{run.plan.arm.name}: what does the law {run.law} hold?{dotted}"
     style.set_heading(panels, axs, title, question)
     return panels

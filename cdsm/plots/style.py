@@ -208,9 +208,12 @@ def _dress(ax: Axes) -> None:
             axis.set_major_locator(MaxNLocator("auto", steps=_STEPS, min_n_ticks=3))
 
 
-def set_title(ax: Axes, title: str | None, question: str) -> None:
-    """Write ``title`` over ``ax``, or the ``question`` if it is None; ``""`` writes nothing."""
-    text = question if title is None else title
+def set_title(ax: Axes, title: str | None, question: str, stable: bool = True) -> None:
+    """Write ``title`` over ``ax``, or the ``question`` if it is None; ``""`` writes nothing.
+
+    The question about an arm that is not ``stable`` says so first.
+    """
+    text = f"{'' if stable else 'UNSTABLE: '}{question}" if title is None else title
     width = figure_of(ax).get_figwidth() * min(1.15 * ax.get_position().width, 1.0)
     ax.set_title(textwrap.fill(text, max(round(_CHARACTERS * width), 20)), parse_math=False)
 

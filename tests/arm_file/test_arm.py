@@ -169,3 +169,27 @@ def test_faults_are_named(before: str, after: str, said: str, tmp_path: Path) ->
     assert before in SHORT
     with pytest.raises(cdsm.FileError, match=f"arm.toml: (?s:.*){re.escape(said)}"):
         read(tmp_path, SHORT.replace(before, after, 1))
+
+
+@pytest.mark.parametrize(
+    ("stem", "text", "name"),
+    [
+        ("SNAKE", "[universal]\n", "SNAKE"),
+        ("my arm-2", "[universal]\n", "my_arm_2"),
+        ("2arm", "[universal]\n", "arm"),  # no name of a robot begins with a digit
+        ("SNAKE", '[universal]\nname = "own"\n', "own"),
+        ("SNAKE", "[[sections]]\n[sections.universal]\n", "SNAKE"),
+    ],
+)
+def test_an_arm_without_a_name_has_that_of_its_file(
+    stem: str, text: str, name: str, tmp_path: Path
+) -> None:
+    sizes = "joints = 2\ncables_per_joint = 3\nlink_length = 0.05\nbase_length = 0.02\n"
+    sizes += "disk_offset = 0.01\nhole_radius = 0.02\nlink_mass = 0.1\n"
+    file = tmp_path / f"{stem}.toml"
+    file.write_text(f"wire = 48e3\n{text}{sizes}", encoding="utf-8")
+    arm = cdsm.Manipulator.read(file)
+    assert arm.name == cdsm.Geometry.read(file).name == name
+    again = arm.write(tmp_path / "another.toml")  # what is written keeps its name
+    assert cdsm.Manipulator.read(again) == arm
+    assert arm.at([0.0] * arm.nv).plot().get_title(loc="left").startswith(f"{name}: ")

@@ -359,11 +359,11 @@ def test_new_writes_the_arm_of_the_readme(tmp_path: Path) -> None:
     found = told("new", path)
     sizes: dict[str, Any] = {"link_length": 0.06, "base_length": 0.03, "disk_offset": 0.012}
     sizes |= {"hole_radius": 0.025, "link_mass": 0.12, "lead": 0.3, "joints": 4}
-    sizes["joint_limit"] = 0.35
+    sizes |= {"joint_limit": 0.35, "name": "ARM"}
     arm = cdsm.Manipulator.read(path)
     assert arm.geometry == cdsm.Geometry.universal(cables_per_joint=3, **sizes)
     assert {cable.minimum for cable in arm.cables} == {10.0}
-    assert found == {"warnings": [], "name": "arm", "length_m": arm.length, "written": [str(path)]}
+    assert found == {"warnings": [], "name": "ARM", "length_m": arm.length, "written": [str(path)]}
     assert call("new", path).exit_code == 2
     assert call("new", path, "--overwrite", "--joints", "2.6").exit_code == 2
 

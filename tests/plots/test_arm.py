@@ -182,7 +182,7 @@ def test_equilibrium_is_drawn_with_its_load_over_its_reference() -> None:
 
 def test_arms_beside_each_other_have_one_scale() -> None:
     straight = POSE.arm.at(0.5 * POSE.q)
-    F = cdsm.distribute_tension(straight, 20.0)
+    F = cdsm.distribute_tension(straight, 90.0)
     cases = [(POSE, PULL, K, "a"), (straight, F, cdsm.stiffness(straight, F), "b")]
     first, second = plots.plot_arms(cases)
     assert np.ptp(first.get_xlim()) == pytest.approx(np.ptp(second.get_xlim()))
@@ -194,8 +194,13 @@ def test_arms_beside_each_other_have_one_scale() -> None:
         color = artists(ax, "cable:")[f"cable:{name}:0"].get_color()
         np.testing.assert_allclose(to_rgba(color), TENSION_COLORS(share), atol=1e-9)
     assert (first.get_title(loc="left"), second.get_title(loc="left")) == ("a", "b")
-    scales = [numbers(words([ax]), "drawn × {}")[0].text for ax in (first, second)]
-    assert scales[0] == scales[1]
+    soft = short_arm(spring=1500.0, lead=0.5).at(np.full(6, 0.1))
+    loose = (soft, None, cdsm.stiffness(soft, cdsm.distribute_tension(soft, 5.0)))
+    scales = [
+        numbers(words([ax]), "drawn × {}")[0].text
+        for ax in (*plots.plot_arms([cases[0], loose]), K.plot())
+    ]
+    assert scales[0] == scales[1] != scales[2]  # alone, the stiff one is enlarged more
     require_look([first, second])
 
 
@@ -227,11 +232,13 @@ def test_path_has_the_way_of_the_tip_and_a_film(plan: PathPlan, tmp_path: Path) 
     require_look(ax)
     with Image.open(tmp_path / "arm.gif") as film:
         assert film.n_frames == 3  # type: ignore[attr-defined]
-    low, high = plan.tensions.min(), plan.tensions.max()
-    name = plan.arm.cables.names[0]
-    shade = TENSION_COLORS((plan.tensions[-1, 0] - low) / (high - low))
-    color = artists(ax, f"cable:{name}:0")[f"cable:{name}:0"].get_color()
-    np.testing.assert_allclose(to_rgba(color), shade, atol=1e-9)
+    F = np.random.default_rng(0).uniform(10.0, 90.0, plan.tensions.shape)
+    for pulls, options in ((plan.tensions, {}), (F, {"tensions": F})):
+        ax = plots.plot_path(plan, **options)
+        for name, pull in zip(plan.arm.cables.names, pulls[-1], strict=True):
+            shade = TENSION_COLORS((pull - pulls.min()) / np.ptp(pulls))
+            color = artists(ax, f"cable:{name}:0")[f"cable:{name}:0"].get_color()
+            np.testing.assert_allclose(to_rgba(color), shade, atol=1e-9)
 
 
 def test_the_arm_of_a_film_moves(tmp_path: Path) -> None:
