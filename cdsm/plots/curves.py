@@ -55,6 +55,9 @@ _MARKS: Final = {
     "stop": ("D", style.GREEN),
     "maximum": ("^", style.BLACK),
     "law": ("v", style.SKY),
+    "lift-off": ("P", style.BLUE),
+    "groove": ("*", "0.3"),
+    "contact": ("p", "0.6"),
     "buckling": ("X", style.VERMILLION),
 }
 """Marker and colour of each kind of event."""

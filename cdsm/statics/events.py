@@ -18,22 +18,27 @@ from numpy.typing import NDArray
 
 from cdsm.applied import combined, scaled
 from cdsm.manipulator import Manipulator
+from cdsm.statics.contact_events import contact_angles, contact_names, is_beside_groove
 from cdsm.statics.continuation import follow
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.pieces import PRECISION, Model, Stage, dip, equilibrium_near, slope, stage_at
 from cdsm.support.values import Array
 
-Kind = Literal["slack", "stop", "maximum", "law", "buckling"]
+Kind = Literal["slack", "stop", "maximum", "law", "lift-off", "groove", "contact", "buckling"]
 
 _WORDS: Final[dict[Kind, str]] = {
     "slack": "{} goes slack",
     "stop": "{} reaches its stop",
     "maximum": "{} passes its maximum tension",
     "law": "{} leaves the domain of its law",
+    "lift-off": "{} lifts off",
+    "groove": "{} leaves the groove beside its plane, where its length has a step,",
+    "contact": "{} touches",
     "buckling": "the arm buckles, {} most",
 }
 _ROUNDING = 1e-9  # a quantity below this part of its scale is zero
 _ALONG = 1e-9  # 1 − cosine of the largest angle between a weight and gravity
+_JUST = 1e-6  # part of a step before an event, where a contact that ends is looked at
 _DEPTH = 4  # most halvings of a step in which a quantity may dip below zero
 
 
@@ -45,9 +50,12 @@ class Event:
     Attributes:
         kind: ``"slack"``: a cable loses its tension; ``"stop"``: a joint reaches its limit;
             ``"maximum"``: a tension passes the largest one of its cable; ``"law"``: a tension
-            leaves the domain of the law of its wire; ``"buckling"``: K_θ is no longer positive
+            leaves the domain of the law of its wire; ``"lift-off"`` and ``"contact"``: a cable
+            leaves or touches a pulley, and K_θ has a step; ``"groove"``: it leaves a groove beside
+            its plane, and its length has a step; ``"buckling"``: K_θ is no longer positive
             definite.
-        place: Name of the cable or joint; for buckling, of the joint that moves most.
+        place: Name of the cable or joint; for buckling, of the joint that moves most; for a pulley,
+            of its cable and its link.
         share: Share of the load (and pull) [-].
         load: Magnitude of the growing force [N]; 0 if no force grows.
     """
@@ -116,17 +124,24 @@ def watched(arm: LockedArm, maximum: Array | None = None) -> Watched:
     stops = np.flatnonzero(np.isfinite([arm.reference.arm.lower, arm.reference.arm.upper]))
     kinds += ["stop"] * stops.size
     places += [joints[i % len(joints)] for i in stops]
+    contacts = contact_names(arm.reference.arm)
+    P = len(contacts)
+    kinds += ["lift-off"] * P
+    kinds += ["contact"] * P
+    places += contacts + contacts
 
     def value(stage: Stage) -> Array:
         locked = stage.arm
         F = locked.continued_tensions(stage.pose)
         gaps = stage.balance.gaps(stage.point.x).ravel()[stops]
-        parts = (most - F)[limited], (F - low)[begun], (high - F)[ended], gaps
+        wrap = contact_angles(stage.pose)
+        parts = (most - F)[limited], (F - low)[begun], (high - F)[ended], gaps, wrap, -wrap
         return np.concatenate(parts)
 
     def scale(stage: Stage) -> Array:
         size = max(float(abs(stage.point.state.tension).max(initial=0.0)), 1e-300)
-        return np.append(np.full(len(kinds) - stops.size, size), np.ones(stops.size))
+        angles = stops.size + 2 * P
+        return np.append(np.full(len(kinds) - angles, size), np.ones(angles))
 
     return Watched(tuple(kinds), tuple(places), value, scale)
 
@@ -253,7 +268,12 @@ def _crossings(
             share = brentq(
                 lambda way, i=i: values(way)[i], low, high, xtol=PRECISION * (high - low)
             )
-        events.append(Event(watch.kinds[i], watch.places[i], share, share * force))
+        kind = watch.kinds[i]
+        if kind == "lift-off":
+            pulley = i - watch.kinds.index("lift-off")
+            touching = at(max(low, share - _JUST * (high - low))).pose
+            kind = "groove" if is_beside_groove(touching, pulley) else kind
+        events.append(Event(kind, watch.places[i], share, share * force))
     return events
 
 
