@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable_laws import CableLaws, LockedLaw
-from cdsm.motors import Yielding
 from cdsm.support.values import Array, frozen
+from cdsm.yielding import Yielding
 
 
 class WireState(NamedTuple):

@@ -20,9 +20,9 @@ import numpy as np
 from cdsm.definition import Term
 from cdsm.joint_springs import Springs
 from cdsm.locked_wires import LockedWires
-from cdsm.motors import Yielding
 from cdsm.posture import Posture
 from cdsm.support.values import Array, total
+from cdsm.yielding import Yielding
 
 CABLE_TERMS = ("active", "passive")
 """Names of the terms that depend on the tensions of the cables."""

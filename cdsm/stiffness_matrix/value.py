@@ -20,7 +20,6 @@ from cdsm import readings
 from cdsm.applied import Applied, Loaded, described, jacobian_at, required_torque
 from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.loads import link_point
-from cdsm.motors import Yielding
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints
 from cdsm.stiffness_matrix.report import Report
@@ -39,6 +38,7 @@ from cdsm.support.validation import Direction, one_of, unit_direction, unit_dire
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 from cdsm.terms import CABLE_TERMS, passive_stiffness
+from cdsm.yielding import Yielding
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

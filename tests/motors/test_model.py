@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.motors import Yielding
 from cdsm.statics.equilibrium import settled
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.support.values import Array
+from cdsm.yielding import Yielding
 from tests.support.motors import BENT, changed, pairs, spooled
 
 RNG = np.random.default_rng(3)
