@@ -8,7 +8,7 @@ scratch data of its own. Callers must pass checked arrays; they receive copies.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from functools import cached_property
 from typing import NamedTuple
@@ -61,10 +61,11 @@ class TreeArrays(NamedTuple):
 
 
 class Shapes(NamedTuple):
-    """Shapes of a URDF that a viser server draws: how to move them, and which joints have any."""
+    """Shapes of a URDF that a viser server draws."""
 
     place: Callable[[Array], None]  # moves the shapes to joint angles (nv,) [rad]
     rows: frozenset[int]  # rows in TreeArrays of the joints whose links have shapes
+    nodes: Mapping[str, list[str]]  # names of the nodes by their links
 
 
 class RigidBody:
@@ -266,7 +267,11 @@ class RigidBody:
                 "of a package:// are looked for in the folders of ROS_PACKAGE_PATH."
             ) from None
         rows = frozenset(int(shape.parentJoint) for shape in shapes.geometryObjects)
-        return Shapes(lambda q: drawn.display(self._angles(q)), rows)
+        nodes: dict[str, list[str]] = {}
+        for shape in shapes.geometryObjects:
+            link = model.frames[shape.parentFrame].name
+            nodes.setdefault(link, []).append(f"{node}/visual/{shape.name}")
+        return Shapes(lambda q: drawn.display(self._angles(q)), rows, nodes)
 
     def _local_twists(self) -> Array:
         """Compute the unit twist of each joint in its own frame (nv+1, 6), linear part first."""

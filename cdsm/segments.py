@@ -214,6 +214,21 @@ class Segments(ReadOnlyState):
         """
         return self.chains.friction * self.wrap
 
+    def hole_places(self, placement: Array) -> tuple[Array, Array]:
+        """Return where each hole is (P, 3) [m], and the direction of the cable behind it (P, 3).
+
+        ``placement`` are the poses of the joints' frames, at which the segments were computed. Both
+        are 0 at pulleys that the cable does not touch.
+        """
+        if self._curvature is not None:
+            assert self.chains.paths is not None
+            return self.chains.paths.hole_places(self._curvature.wrapping, placement)
+        assert self._spans is not None
+        routing = self.chains.routing
+        behind = self.chains.hole + 1
+        sites = routing.sites(placement)
+        return sites.T[routing.first[behind]], self._spans.direction.T[behind]
+
     @property
     def ratio(self) -> Array:
         """Largest ratio T_{j+1}/T_j (S,) [-] that the hole after segment j allows: e^μφ.

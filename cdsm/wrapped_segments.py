@@ -232,31 +232,79 @@ class ChainPaths:
             np.array([departing.get(node, -1) for node in nodes], np.intp),
         )
 
+    def hole_places(self, wrapping: Wrapping, placement: Array) -> tuple[Array, Array]:
+        """Return where each hole is (P, 3) [m], and the unit direction of the cable there (P, 3).
+
+        Both are 0 at pulleys that the cable does not touch. Holes of a sheath divide the straight
+        line between its sites; before the first site they are at this one.
+        """
+        division = self.division(tuple(wrapping.contacts.touches))
+        wraps = self.wraps
+        frames = placement[wraps.row]
+        entries = np.einsum("exy,ey->ex", frames[:, :3, :3], wraps.point) + frames[:, :3, 3]
+        points, along = np.zeros((2, self.hole.size, 3))
+        at = np.flatnonzero(self.site >= 0)
+        points[at] = entries[self.site[at]]
+        along[at] = wrapping.spans.direction.T[division.behind[at]]
+        chosen = wrapping.pattern.pulley
+        for p, arrival, first in zip(
+            chosen.tolist(),
+            wrapping.pattern.contact[: chosen.size].tolist(),
+            self._first_turns(wrapping, placement).tolist(),
+            strict=True,
+        ):
+            radial = wrapping.node[:, arrival] - wrapping.centre[:, p]
+            for i in range(int(self.count[p])):
+                turn = min(max(first + i * self.spacing[p], 0.0), wrapping.contacts.angle[p])
+                hole = self.first[p] + i
+                points[hole], along[hole] = wrapping.on_arc(p, radial, turn)
+        for hole in np.flatnonzero((self.site < 0) & (self.pulley < 0)).tolist():
+            points[hole], along[hole] = self._in_sheath(hole, entries)
+        return points, along
+
+    def _in_sheath(self, hole: int, entries: Array) -> tuple[Array, Array]:
+        """Return the place (3,) of a hole in a sheath, and a direction there, from those (E, 3)."""
+        cable = self.cable[self.hole]
+        same = np.flatnonzero((cable == cable[hole]) & (self.place == self.place[hole]))
+        behind = int(np.searchsorted(self.after, self.hole[hole], side="right"))
+        before = behind - 1
+        part = (hole - same[0] + 0.5) / same.size
+        if before < 0 or self.cable[self.after[before]] != cable[hole]:  # it begins the cable
+            before, behind, part = behind, behind + 1, 0.0
+        way = entries[behind] - entries[before]
+        return entries[before] + part * way, way / (float(np.linalg.norm(way)) or 1.0)
+
     def _add_arcs(self, length: Array, wrapping: Wrapping, placement: Array) -> None:
         """Add the arcs of touching pulleys, from contact to mark and from mark to contact."""
-        wraps = self.wraps
         chosen = wrapping.pattern.pulley
-        T = chosen.size
-        if not T:
+        if not chosen.size:
             return
-        axis = wrapping.axis[:, chosen]
-        radial = wrapping.node[:, wrapping.pattern.contact[:T]] - wrapping.centre[:, chosen]
-        radial = radial - dot(axis, radial) * axis
-        rotation = placement[wraps.row[wraps.entry[chosen]], :3, :3]
-        mark = np.einsum("pxy,py->xp", rotation, self.marks[chosen])
         n = self.count[chosen]
         spacing = self.spacing[chosen]
         angle = wrapping.angle[chosen]
-        # the first mark, of the turn in which it is nearest to its place on the arc
-        begin = np.arctan2(dot(axis, cross(radial, mark)), dot(radial, mark))
-        expected = 0.5 * (angle - (n - 1) * spacing)
-        begin += 2.0 * np.pi * np.round((expected - begin) / (2.0 * np.pi))
+        begin = self._first_turns(wrapping, placement)
         arc = np.array(wrapping.arcs)[chosen] / np.where(angle > 0.0, angle, 1.0)  # per angle
         hole = self.hole[self.first[chosen]]
         np.add.at(length, hole, arc * begin)
         np.add.at(length, hole + n, arc * (angle - begin - (n - 1) * spacing))
         for i, several in enumerate(n.tolist()):
             length[hole[i] + 1 : hole[i] + several] += arc[i] * spacing[i]
+
+    def _first_turns(self, wrapping: Wrapping, placement: Array) -> Array:
+        """Compute the angle from the arrival to the first mark of each touching pulley [rad]."""
+        wraps = self.wraps
+        chosen = wrapping.pattern.pulley
+        axis = wrapping.axis[:, chosen]
+        contact = wrapping.pattern.contact[: chosen.size]
+        radial = wrapping.node[:, contact] - wrapping.centre[:, chosen]
+        radial = radial - dot(axis, radial) * axis
+        rotation = placement[wraps.row[wraps.entry[chosen]], :3, :3]
+        mark = np.einsum("pxy,py->xp", rotation, self.marks[chosen])
+        # of the turn in which it is nearest to its place on the arc
+        begin = np.arctan2(dot(axis, cross(radial, mark)), dot(radial, mark))
+        spread = (self.count[chosen] - 1) * self.spacing[chosen]
+        expected = 0.5 * (wrapping.angle[chosen] - spread)
+        return np.asarray(begin + 2.0 * np.pi * np.round((expected - begin) / (2.0 * np.pi)))
 
     def _turns(self, wrapping: Wrapping, division: _Division) -> tuple[Array, Array]:
         """Compute by which angle the cables turn at each hole (P,), and its derivative (P, nv)."""

@@ -140,14 +140,20 @@ class Wrapping:
 
     def _arc(self, pulley: int, begin: Array) -> list[Array]:
         """Return points on the arc of a pulley that begins at ``begin``, seen from the centre."""
-        axis = self.axis[:, pulley]
         angle = self.contacts.angle[pulley]
+        turns = np.linspace(0.0, angle, max(math.ceil(angle / _ARC_STEP), 1) + 1)
+        return [self.on_arc(pulley, begin, turn)[0] for turn in turns.tolist()]
+
+    def on_arc(self, pulley: int, begin: Array, turn: float) -> tuple[Array, Array]:
+        """Return a point (3,) [m] on the arc of a pulley, and the unit direction of the cable.
+
+        The arc begins at ``begin`` (3,) [m], seen from the centre; ``turn`` counts from there.
+        """
+        axis = self.axis[:, pulley]
         radial = begin - (axis @ begin) * axis
         across = np.cross(axis, radial)
         climb = self.contacts.slope[pulley] * self.wraps.radius[pulley] * axis
-        turns = np.linspace(0.0, angle, max(math.ceil(angle / _ARC_STEP), 1) + 1)
         start = self.centre[:, pulley] + (axis @ begin) * axis
-        return [
-            start + math.cos(turn) * radial + math.sin(turn) * across + turn * climb
-            for turn in turns.tolist()
-        ]
+        point = start + math.cos(turn) * radial + math.sin(turn) * across + turn * climb
+        along = math.cos(turn) * across - math.sin(turn) * radial + climb
+        return point, along / np.linalg.norm(along)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -12,7 +12,8 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 from cdsm.applied import Applied
-from cdsm.errors import CdsmError, InvalidInput
+from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
+from cdsm.loads import LoadsLike
 from cdsm.planning.sensitivity import Saturation, saturation
 from cdsm.plots import style
 from cdsm.plots.style import MM, N_PER_MM, Panels
@@ -20,7 +21,10 @@ from cdsm.posture import Posture
 from cdsm.quantities import QUANTITIES, display_of, si_of
 from cdsm.statics.buckling import critical_tension
 from cdsm.statics.hung_loads import total_force
+from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
+from cdsm.stiffness_matrix.prints import softer_side
+from cdsm.stiffness_matrix.verdict import describe_buckling
 from cdsm.support.format import one_unit, plural
 from cdsm.support.status import check_sweep
 from cdsm.support.validation import (
@@ -169,45 +173,70 @@ def plot_stiffness_over_tension(
     return panel
 
 
+class TensionLevel(NamedTuple):
+    """Stiffness under the least tensions with a lower bound."""
+
+    held: float  # the lower bound that held [N]
+    along: float  # K.along(u) [N/m]; NaN if the arm is not stable
+    terms: Mapping[str, float]  # of it [N/m]
+    problem: CdsmError | None = None  # why there is none
+    status: Status = Status.OK  # of it
+
+
+def at_level(
+    pose: Posture,
+    bound: float,
+    u: Array,
+    wrench: LoadsLike = NO_WRENCH,
+    maximum: ArrayLike = math.inf,
+    *,
+    softer: bool = False,
+) -> TensionLevel:
+    """Compute the stiffness along u (3,) under the least tensions with a lower bound [N].
+
+    ``softer`` takes the softer side of u and −u. Raises CdsmError if an argument is at fault.
+    """
+    held = bound
+    try:
+        F = distribute_tension(pose, bound, maximum, wrench)
+        held = float(F.minimum_held.min())
+        K = stiffness(pose, F)
+        if softer and K.slack:
+            u = softer_side(K.along, u)
+        along = K.along(u)  # raises what is wrong
+        if not K.is_stable:
+            problem = SingularStiffness(describe_buckling(K), K.critical_direction)
+            return TensionLevel(held, math.nan, {}, problem, Status.UNSTABLE)
+        shares = K.shares(u)
+    except CdsmError as error:
+        if error.status.is_fault:
+            raise
+        return TensionLevel(held, math.nan, {}, error, error.status)
+    terms = {"passive": shares.passive.sum(), "active": shares.active.sum(), **shares.others}
+    return TensionLevel(held, along, terms)
+
+
 def _over_tension(
     pose: Posture, bounds: Array, u: Array, wrench: Applied, maximum: Array
 ) -> tuple[Array, Array, dict[str, Array]]:
     """Return tensions that held [N], stiffness and its terms [N/mm]; NaN where it is unstable."""
-    levels: list[float] = []
-    along: list[float] = []
-    parts: list[dict[str, float]] = []
+    levels: list[TensionLevel] = []
     error: CdsmError | None = None
     for bound in bounds.tolist():
-        held = bound
-        row: dict[str, float] = {}
-        value = math.nan
-        try:
-            F = distribute_tension(pose, bound, maximum, wrench)
-            held = float(F.minimum_held.min())
-            K = stiffness(pose, F)
-            if K.is_stable:
-                shares = K.shares(u)
-                value = K.along(u)
-                row = {"passive": shares.passive.sum(), "active": shares.active.sum()}
-                row |= shares.others
-            else:
-                K.along(u)  # raises what is wrong
-        except CdsmError as problem:
-            if problem.status.is_fault:
-                raise
-            error = problem
-        if not levels or held > levels[-1]:
-            levels.append(held)
-            along.append(N_PER_MM * value)
-            parts.append(row)
+        level = at_level(pose, bound, u, wrench, maximum)
+        error = level.problem or error
+        if not levels or level.held > levels[-1].held:
+            levels.append(level)
+    along = N_PER_MM * np.array([level.along for level in levels])
     if not np.isfinite(along).any():
         assert error is not None
         raise error
-    names = dict.fromkeys(name for row in parts for name in row)
+    names = dict.fromkeys(name for level in levels for name in level.terms)
     terms = {
-        name: N_PER_MM * np.array([row.get(name, math.nan) for row in parts]) for name in names
+        name: N_PER_MM * np.array([level.terms.get(name, math.nan) for level in levels])
+        for name in names
     }
-    return np.array(levels), np.array(along), terms
+    return np.array([level.held for level in levels]), along, terms
 
 
 def _shade_unstable(panel: Axes, stable: float, buckles: float) -> str:

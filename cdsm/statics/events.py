@@ -16,13 +16,13 @@ from typing import Final, Literal, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.applied import combined, scaled
+from cdsm.applied import Applied, as_loads, combined, scaled
 from cdsm.manipulator import Manipulator
 from cdsm.statics.contact_events import contact_angles, contact_names, is_beside_groove
 from cdsm.statics.continuation import follow
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.pieces import PRECISION, Model, Stage, dip, equilibrium_near, slope, stage_at
-from cdsm.support.values import Array
+from cdsm.support.values import Array, total
 
 Kind = Literal["slack", "stop", "maximum", "law", "lift-off", "groove", "contact", "buckling"]
 
@@ -199,8 +199,8 @@ def _loss(stage: Stage, force: float) -> Event:
     return Event("buckling", joint, stage.share, stage.share * force)
 
 
-def events_under(arm: LockedArm, load: Array, maximum: Array) -> tuple[Event, ...]:
-    """Locate the events while a load W (6,) grows on a locked arm that its reference balances.
+def events_under(arm: LockedArm, load: Applied, maximum: Array) -> tuple[Event, ...]:
+    """Locate the events while a load grows on a locked arm that its reference balances.
 
     ``maximum`` (C,) [N] are the largest tensions.
     """
@@ -210,7 +210,7 @@ def events_under(arm: LockedArm, load: Array, maximum: Array) -> tuple[Event, ..
 
     start = stage_at(model, arm.reference, np.zeros(arm.reference.q.size), 0.0)
     branch = follow(model, start, 1.0)
-    force = float(np.linalg.norm(load[:3]))
+    force = float(np.linalg.norm(total([part.wrench[:3] for part in as_loads(load).loads])))
     return events_on(model, branch, watched(arm, maximum), force, 1.0)
 
 

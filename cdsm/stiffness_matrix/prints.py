@@ -68,7 +68,7 @@ def table_rows(K: Stiffness) -> list[tuple[str, ...]]:
     rows = np.full((3 + len(parts), 3), math.nan)
     for i, u in enumerate(axes):
         with suppress(SingularStiffness):
-            softer = u if K.along(u) <= K.along(-u) else -u
+            softer = softer_side(K.along, u)
             rows[0, i] = K.along(softer)
             shares = K.shares(softer)
             sums = shares.passive.sum(), shares.active.sum(), *shares.others.values()
@@ -86,6 +86,11 @@ def table_rows(K: Stiffness) -> list[tuple[str, ...]]:
     names = [along, *(f"  of it {part}" for part in parts), "cartesian, diagonal"]
     names = [f"stiffness [{unit}]", *names, "pseudoinverse, diagonal"]
     return [(name, *row) for name, row in zip(names, ["xyz", *cells], strict=True)]
+
+
+def softer_side(along: Callable[[Array], float], u: Array) -> Array:
+    """Return u (3,) or −u, whichever side is softer: they differ if cables are at 0 N."""
+    return u if along(u) <= along(-u) else -u
 
 
 def notes(K: Stiffness) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 viser serves every client, and lets it change any property of any control. The guard refuses web
 pages of other sites, which their ``Origin`` header shows, and other names of this machine, as after
 DNS rebinding. Our page may connect to its own server only. Of its messages pass: camera, drags of
-the tip's handle, and values of controls.
+the tip's handle, and values of controls. Files are only sent to it.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from cdsm.view.scene import HANDLE
 _HOST = "127.0.0.1"
 _FARTHEST = 1e6  # largest coordinate [m] to which it may be dragged
 _LONGEST = 2**16  # size of a message in bytes; those of the page have a few hundred
+_CHOICES: Final = (viser.GuiDropdownHandle, viser.GuiButtonGroupHandle)
 _STARTING: Final = threading.Lock()
 
 
@@ -94,6 +95,8 @@ def _allows(server: viser.ViserServer, message: Any) -> bool:
             control = server.gui._gui_input_handle_from_uuid.get(uuid)
             if isinstance(control, viser.GuiSliderHandle):
                 value = _number(value) and float(min(max(value, control.min), control.max))
+            elif isinstance(control, _CHOICES) and value not in control.options:
+                return False
             message["updates"] = {"value": value}
             return control is not None and type(value) is type(control.value)
         case {"type": "TransformControlsUpdateMessage", "position": [*place]}:

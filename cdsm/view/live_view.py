@@ -11,22 +11,33 @@ import math
 import threading
 from collections.abc import Callable
 from concurrent import futures
-from typing import TYPE_CHECKING, Self, final
+from typing import TYPE_CHECKING, Any, Self, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import CdsmError, InvalidInput, need
-from cdsm.kinematics import inverse_kinematics
+from cdsm.errors import CdsmError, need
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path import checked_path
-from cdsm.plots.style import MM
 from cdsm.status import Status
 from cdsm.support.validation import checked_quantity, instance, vector, whole_number
 from cdsm.support.values import Array
+from cdsm.view.curve import compute_curve
+from cdsm.view.history import History
 from cdsm.view.panel import Panel
-from cdsm.view.scene import HANDLE, Scene
+from cdsm.view.path_player import Player, tips_of
+from cdsm.view.saving import (
+    command_text,
+    draw_picture,
+    file_name,
+    posture_text,
+    python_text,
+    view_of,
+)
+from cdsm.view.scene import Scene
 from cdsm.view.state import Setting, Shown, show
+from cdsm.view.texts import said_numbers
+from cdsm.view.tip_handle import TipHandle
 
 if TYPE_CHECKING:
     import viser
@@ -34,9 +45,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 _PANEL = 390  # width of the panel in pixels, so that its longest row fits on one line
-_SIZE = 0.2  # size of the handle at the tip, over the arm's length
-_FASTEST = 30.0  # largest speed of a path, and its first speed [samples/s]
-_SPEED = 10.0
+_REST = 0.3  # for which no control moves [s] before what takes longer is computed
 
 
 def serve(
@@ -59,6 +68,11 @@ def serve(
     An arm with springs and fewer cables than joints has sliders of how much wire each motor takes
     in, from straight cables, and :func:`~cdsm.forward_statics` gives its posture; with ``q`` or a
     path it has those of the joints.
+
+    The page has the verdict with the stiffness of the softer side along each axis, bars of the
+    tensions with their bounds, the stiffness over the least tension, the matrix of the tip, and
+    sliders that end at the arm's own bounds: the force at twice what the arm holds. It acts at the
+    tip or on a link. Buttons undo a change, and save the picture or lines that compute the same.
 
     Args:
         arm: The arm; it is not changed.
@@ -87,7 +101,7 @@ def serve(
     free = q is None and angles is None and tips is None
     pulled = free and arm.has_springs and len(arm.cables) < arm.nv
     path = None if angles is None and tips is None else checked_path(arm, angles, tips)
-    route = path if path is None or tips is not None else _tips(arm, path)
+    route = path if path is None or tips is not None else tips_of(arm, path)
     start = Setting(
         q=arm.checked_angles(straight if q is None else q),
         minimum=checked_quantity("minimum", minimum, "tension", zero=True),
@@ -119,15 +133,21 @@ class View:
         self.arm = arm
         self._server = server
         self._closed = threading.Event()
+        self._moved = threading.Event()
         self._lock = threading.Lock()
         self._thread = futures.ThreadPoolExecutor(1, "cdsm view")
         self._last: futures.Future[None] | None = None
+        self._later: futures.Future[None] | None = None
         self._player: Player | None = None
         self._panel = Panel(server.gui, arm, start, self._request)
+        self._history = History(self._panel.values)
         self._scene = Scene(server, arm, self._panel.largest_force)
         self._handle = TipHandle(server.scene, arm, self._request)
         self._refresh()
         self._scene.begin(server.initial_camera, self._shown, np.empty((0, 3)))
+        self._panel.steps.on_click(self._step)
+        self._panel.save.on_click(self._save)
+        server.on_client_connect(lambda client: self._scene.fit(client.camera))
 
     @property
     def url(self) -> str:
@@ -150,6 +170,7 @@ class View:
             return
         if self._player is not None:
             self._player.paused.set()
+        self._moved.set()
         self._thread.shutdown()
         with contextlib.redirect_stdout(None):  # viser prints that it stops
             self._server.stop()
@@ -175,18 +196,24 @@ class View:
 
     def _request(self) -> None:
         """Request a refresh, from any thread. All requests during one together cause one more."""
-        with self._lock, contextlib.suppress(RuntimeError):  # the view is closed
+        self._moved.set()
+        with self._lock:
             if self._last is None or self._last.running() or self._last.done():
-                self._last = self._thread.submit(self._refresh)
+                self._last = self._submit(self._refresh) or self._last
 
     def _refresh(self) -> None:
+        self._moved.clear()
         try:
             self._handle.follow(self._panel)
+            self._history.note(self._panel.values)
             self._put(show(self.arm, self._panel.setting))
         except Exception as error:  # a bug must not leave outdated numbers on the page
             _LOG.exception("the view cannot show %s", setting := self._panel.setting)
             problem = f"{type(error).__name__}: {error}"
             self._put(Shown(setting=setting, status=Status.FAILED, problem=problem))
+        self._history.rest()
+        if not self._moved.is_set():
+            self._later = self._submit(self._complete, self._shown)
 
     def _put(self, shown: Shown) -> None:
         with self._server.atomic():
@@ -194,102 +221,68 @@ class View:
             self._panel.update(shown, self._scene, self._handle.update(shown))
         self._shown = shown
 
-
-@final
-class Player:
-    """Controls that play ``path``; ``go`` moves the arm to a row, and returns when it is shown."""
-
-    def __init__(
-        self, gui: viser.GuiApi, panel: Panel, path: Array, go: Callable[[Array], None]
-    ) -> None:
-        self._size = float(len(path))
-        self.paused = threading.Event()
-        self.paused.set()
-        with gui.add_folder("Path", order=0.0):
-            self.sample = panel.add_slider(f"sample of {len(path)}", 1.0, self._size, 1.0, 1.0)
-            self._speed = panel.add_slider("samples per s", 1.0, _FASTEST, _SPEED, 1.0)
-            self.button = gui.add_button("Play")
-        self.button.on_click(lambda _: self.play())
-        self.sample.on_update(lambda _: go(path[round(self.sample.value) - 1]))
-
-    def play(self) -> None:
-        """Play to the end, from the start if it is there; or pause, if it plays."""
-        if not self.paused.is_set():
-            self.paused.set()
+    def _complete(self, shown: Shown) -> None:
+        """Show what takes longer, once no control has moved for a while."""
+        if self._moved.wait(_REST) or shown is not self._shown:
             return
-        self.paused.clear()
-        self.button.label = "Pause"
-        if self.sample.value == self._size:
-            self.sample.value = 1.0  # type: ignore[misc]
-        while self.sample.value < self._size and not self.paused.wait(1.0 / self._speed.value):
-            self.sample.value += 1.0  # type: ignore[misc]
-        self.paused.set()
-        self.button.label = "Play"
+        code = f"{python_text(self.arm, shown.setting)}\n\n{command_text(self.arm, shown.setting)}"
+        curve = None
+        with contextlib.suppress(CdsmError):
+            axis = self._panel.curve.axis.value
+            curve = compute_curve(shown, axis, self._panel.tension_ends, self._moved.is_set)
+        if not self._moved.is_set():
+            with self._server.atomic():
+                self._panel.complete(shown, code)
+                self._panel.curve.draw(curve)
 
-
-@final
-class TipHandle:
-    """Handle at the tip, which users drag. Each drag calls ``changed``, in any thread."""
-
-    def __init__(
-        self, scene: viser.SceneApi, arm: Manipulator, changed: Callable[[], None]
-    ) -> None:
-        self._arm = arm
-        self._changed = changed
-        self._target: Array | None = None
-        self._dragged = False
-        self._remark = ""
-        self._q = np.full(arm.nv, np.nan)
-        self._node = scene.add_transform_controls(
-            HANDLE, _SIZE * arm.length, disable_rotations=True, depth_test=False, opacity=0.7
-        )
-        self._node.on_update(self._on_drag)
-
-    async def _on_drag(self, event: viser.TransformControlsEvent) -> None:
-        # viser keeps the order of these calls only if the function is asynchronous
-        self._dragged = event.phase != "end"
-        if event.phase == "update":
-            self.aim(np.array(event.target.position))
+    def _step(self, event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+        """Do what a button says: the straight arm, the setting before, or the first one."""
+        if event.target.value == "Straight":
+            self._panel.move(np.zeros(self.arm.nv))
+        elif event.target.value == "Reset":
+            self._panel.reset()
         else:
-            self._changed()
+            self._moved.set()
+            self._submit(self._undo)  # no refresh can come between two controls
 
-    def aim(self, target: Array) -> None:
-        """Set a new target of the tip (3,) [m], and call ``changed``."""
-        self._target = target
-        self._changed()
+    def _undo(self) -> None:
+        values = self._history.back()
+        if values is not None:
+            self._panel.put(values)
+        self._request()
 
-    def follow(self, panel: Panel) -> None:
-        """Move the joints of ``panel`` so that the tip is at, or nearest to, a new target."""
-        target = self._target
-        self._target = None
-        if target is None or panel.pulls:
+    def _save(self, event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+        """Send the browser that asks the picture of what is shown, or lines that compute it."""
+        client = event.client
+        if client is None:
             return
-        solution = inverse_kinematics(self._arm, target, panel.setting.q)
-        panel.move(solution.angles)
-        self._q = panel.setting.q
-        self._remark = ""
-        if not solution.reachable:
-            stops = f" ({', '.join(solution.at_limit)} at a limit)" if solution.at_limit else ""
-            missed = f"{MM * solution.position_error:.3g} mm"
-            self._remark = f"The tip stays {missed} away from the handle{stops}."
+        self._submit(self._send, client, event.target.value)
 
-    def update(self, shown: Shown) -> str:
-        """Move the handle to the tip, unless it is dragged; return why the tip did not reach it.
+    def _send(self, client: viser.ClientHandle, what: str) -> None:
+        if what == "Posture":
+            numbers = said_numbers(self._shown)
+            content = posture_text(self.arm, self._shown, numbers).encode()
+            client.send_file_download(
+                file_name(self.arm, "_posture.py"), content, save_immediately=True
+            )
+            return
+        picture = draw_picture(self._shown, view_of(client.camera))
+        if picture is None:
+            client.add_notification("No picture", "There is no posture to draw.", color="red")
+        else:
+            client.send_file_download(file_name(self.arm, ".svg"), picture, save_immediately=True)
 
-        The reason is empty if the tip did, or if the arm has been moved since.
-        """
-        self._node.visible = shown.reference is not None and shown.setting.pull is None
-        if shown.reference is not None and not self._dragged:
-            self._node.position = shown.reference.tip[:3, 3]
-        return self._remark if np.array_equal(shown.setting.q, self._q) else ""
-
-
-def _tips(arm: Manipulator, path: Array) -> Array:
-    """Return the tip positions (S, 3) [m] at joint angles (S, nv); name a sample that has none."""
-    tips = []
-    for i, q in enumerate(path):
+    def _submit(self, job: Callable[..., None], *arguments: Any) -> futures.Future[None] | None:
+        """Let the one thread do a job after those before; None if the view is closed."""
         try:
-            tips.append(arm.at(q).tip[:3, 3])
-        except CdsmError as error:
-            raise InvalidInput("angles", f"sample {i + 1}: {error}") from None
-    return np.array(tips)
+            future = self._thread.submit(job, *arguments)
+        except RuntimeError:
+            return None
+        future.add_done_callback(_log_error)
+        return future
+
+
+def _log_error(done: futures.Future[None]) -> None:
+    """Say what went wrong in a job, which nobody waits for."""
+    if error := done.exception():
+        _LOG.error("a job of the view has failed", exc_info=error)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import GeometryError
 from cdsm.manipulator import Manipulator
+from cdsm.plots.style import round_number
 from cdsm.status import Status
 from cdsm.support.values import Array
 from cdsm.view.ellipsoid import ELLIPSOID_GRID
@@ -29,10 +31,18 @@ ELLIPSOID: Final[Color] = (200, 85, 61)
 FORCE: Final[Color] = (59, 111, 182)
 STICKS: Final[Color] = (40, 40, 45)
 SLIDES: Final[Color] = (220, 38, 127)
+TOUCHING: Final[Color] = (213, 94, 0)
 
+_CELL: Final[Color] = (235, 235, 235)
+_SECTION: Final[Color] = (215, 215, 215)
 _NOTHING: Final = np.zeros((1, 2, 3))
 _ARROW = 0.5  # length of the arrow of the largest force, over the arm's length
-_SIDE: Final = np.array([0.44, -3.3, 1.64])  # from the arm to the first camera, over its radius
+_SIDE: Final = np.array([0.3, -2.7, 1.1])  # from the arm to the first camera, over its radius
+_FIELD = math.pi / 4.0  # vertical angle of the camera
+_SQUARE = 1.05  # width over height of a window below which the arm would not fit
+_PHONE = 576  # widest window [pixels] over which viser lays its panel, on the lower 60 %
+_FREE_CENTRE = 0.55  # height of the middle of the rest, from the middle of the window to its top
+_WIDE = 3.5  # of a cable [pixels]
 
 
 class Scene:
@@ -46,7 +56,7 @@ class Scene:
         self._arm = arm
         self._scene = server.scene
         length = arm.length
-        self.cell = 10.0 ** math.floor(math.log10(length / 5.0))  # size of a cell of the grid [m]
+        self.cell = round_number(length / 5.0)  # size of a cell of the grid [m]
         self.force_scale = _ARROW * length / largest_force  # length of the arrow per force [m/N]
         self._draw_surroundings()
         # without a posture, what is below these frames is hidden
@@ -57,6 +67,8 @@ class Scene:
             _LOG.warning("%s Sticks are drawn instead.", error)
             self._shapes = None
         self._frames = frames if self._shapes else frames[1:]
+        self._links = {} if self._shapes is None else self._meshes(self._shapes.nodes)
+        self._touching: frozenset[str] = frozenset()
         lines = partial(self._scene.add_line_segments, points=_NOTHING)
         thick = partial(lines, thickness=0.012 * length, visible=False)
         self._thin = thin = partial(lines, thickness_units="screen", colors=GREY, visible=False)
@@ -68,7 +80,7 @@ class Scene:
         # one node per cable: viser treats colours of single points as linear light, so they
         # would differ from the colours of the table
         names = [str(i) for i in range(len(arm.cables))]
-        self._cables = [thin(f"/cables/{i}", thickness=2.5, visible=True) for i in names]
+        self._cables = [thin(f"/cables/{i}", thickness=_WIDE, visible=True) for i in names]
         self._ellipsoid = self._scene.add_mesh_simple(
             "/ellipsoid",
             np.zeros((math.prod(ELLIPSOID_GRID), 3)),
@@ -99,11 +111,27 @@ class Scene:
         low = points.min(axis=0)
         high = points.max(axis=0)
         radius = max(float(np.linalg.norm(high - low)), length) / 2.0
-        camera.look_at = (low + high) / 2.0
-        camera.position = camera.look_at + radius * _SIDE
-        camera.fov = math.pi / 4.0
+        self._centre = (low + high) / 2.0
+        self._radius = radius
+        camera.look_at = self._centre
+        camera.position = self._centre + radius * _SIDE
+        camera.fov = _FIELD
         camera.near = radius / 50.0
         camera.far = 200.0 * radius
+
+    def fit(self, camera: viser.CameraHandle) -> None:
+        """Show the whole arm in a window that is narrow, above the panel that lies over it."""
+        width = camera.image_width
+        aspect = width / max(camera.image_height, 1)
+        if aspect >= _SQUARE:
+            return
+        away = self._radius * _SIDE * _SQUARE / max(aspect, 0.1)
+        sight = away / np.linalg.norm(away)
+        up = np.eye(3)[2] - sight[2] * sight
+        up *= math.tan(_FIELD / 2.0) * float(np.linalg.norm(away) / np.linalg.norm(up))
+        target = self._centre - (_FREE_CENTRE if width <= _PHONE else 0.0) * up
+        camera.position = target + away
+        camera.look_at = target
 
     def update(self, shown: Shown, names: bool) -> None:
         """Draw the results ``shown``; ``names`` labels all cables."""
@@ -138,6 +166,7 @@ class Scene:
             return
         if self._shapes is not None:
             self._shapes.place(pose.q)
+        self._paint(shown.touching)
         for i, (cable, path) in enumerate(zip(self._cables, pose.cable_paths, strict=True)):
             cable.points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
             cable.colors = np.array(shown.cable_colors[i], dtype=np.uint8)
@@ -148,9 +177,28 @@ class Scene:
             self._ellipsoid.vertices = ellipsoid.surface.reshape(3, -1).T.astype(np.float32)
         tip = pose.tip[:3, 3]
         if self._force.visible:
-            self._force.points = np.array([[tip, tip + self.force_scale * force]], np.float32)
+            start = shown.loaded_point
+            self._force.points = np.array([[start, start + self.force_scale * force]], np.float32)
         self._label.text = shown.heading
         self._label.position = tip + 0.1 * self._arm.length * np.eye(3)[2]
+
+    def _meshes(self, nodes: Mapping[str, list[str]]) -> dict[str, list[tuple[Any, Any]]]:
+        """Return the meshes of each link whose colour can change, with their colours."""
+        handles = {
+            link: [self._scene.get_handle_by_name(name) for name in names]
+            for link, names in nodes.items()
+        }
+        return {
+            link: [(mesh, mesh.color) for mesh in meshes if hasattr(mesh, "color")]  # type: ignore[union-attr]
+            for link, meshes in handles.items()
+        }
+
+    def _paint(self, touching: frozenset[str]) -> None:
+        """Give links that overlap a colour of their own, and others theirs."""
+        for link in touching ^ self._touching:
+            for mesh, color in self._links.get(link, []):
+                mesh.color = TOUCHING if link in touching else color
+        self._touching = touching
 
     def _draw_surroundings(self) -> None:
         scene = self._scene
@@ -169,6 +217,8 @@ class Scene:
             position=(0.0, 0.0, -0.4 * length),
             cell_size=self.cell,
             section_size=5.0 * self.cell,
+            cell_color=_CELL,  # paler than the cables
+            section_color=_SECTION,
             fade_distance=100.0 * length,
         )
 

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
+from cdsm.applied import Applied, acts
 from cdsm.errors import CdsmError
-from cdsm.friction.capstan import can_stick
+from cdsm.loads import link_point, loads_of
 from cdsm.manipulator import Manipulator
+from cdsm.measures.indices import principal_stiffness
 from cdsm.plots.style import tension_colors
 from cdsm.posture import Posture
 from cdsm.report.remedies import find_remedies
@@ -27,13 +29,12 @@ from cdsm.stiffness_matrix.verdict import Finding, Verdict, find_excess
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, distribute_tension
 from cdsm.view.ellipsoid import Ellipsoid, ellipsoid
+from cdsm.view.holes import hole_lines
 
 Color = tuple[int, int, int]
 
 GREY: Final = (150, 150, 150)
 """Colour of cables with unknown tension."""
-
-_BEAD = 0.013  # half the length of the mark of a hole, as a fraction of the arm's length
 
 
 @final
@@ -44,9 +45,16 @@ class Setting:
     q: Array  # joint angles (nv,) [rad]; [m] for prismatic joints
     minimum: float  # lower bound of all tensions [N]
     maximum: float = math.inf  # upper bound of all tensions [N]
-    force: Array  # at the tip, in base axes (3,) [N]
+    force: Array  # in base axes (3,) [N]
+    link: str = ""  # on which the force acts; empty: at the tip
     sag: bool = False  # whether the force moves the arm, tensioned without it, motors locked
     pull: Array | None = None  # wire that the motors take in (C,) [m]: the posture follows from it
+
+    @property
+    def wrench(self) -> Array | dict[str, Array]:
+        """The force as functions take it: W (6,) at the tip, or by its link."""
+        W = np.concatenate([self.force, np.zeros(3)])
+        return {self.link: W} if self.link else W
 
 
 @final
@@ -82,6 +90,15 @@ class Shown:
         return None if self.tension is None else self.tension.values
 
     @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Bounds (C,) [N] of the tensions; motors that hold the wire have no lower one."""
+        if self.tension is not None:
+            return self.tension.minimum_held, self.tension.maximum_held
+        assert self.posture is not None
+        own = np.array([cable.maximum for cable in self.posture.arm.cables])
+        return np.zeros(own.size), np.minimum(own, self.setting.maximum)
+
+    @property
     def source(self) -> Equilibrium | Stiffness | None:
         """What knows the compliance of the tip; None if the arm is not stable as shown."""
         firm = self.verdict is not None and self.verdict.is_firm
@@ -97,6 +114,30 @@ class Shown:
         return ellipsoid(source.compliance[:3, :3], pose.tip[:3, 3], pose.arm.length)
 
     @cached_property
+    def principal(self) -> dict[str, Array]:
+        """Softest and stiffest directions of the tip, where it is stable."""
+        assert self.source is not None
+        return principal_stiffness(self.source.compliance[:3, :3])
+
+    @property
+    def loaded_point(self) -> Array:
+        """Where the force acts on the drawn posture (3,) [m]."""
+        assert self.posture is not None
+        return loaded_point(self.posture, self.setting.link)
+
+    @property
+    def moved_point(self) -> Array:
+        """How far the force moved the point where it acts (3,) [m]."""
+        assert self.reference is not None
+        return self.loaded_point - loaded_point(self.reference, self.setting.link)
+
+    @property
+    def touching(self) -> frozenset[str]:
+        """Names of the links that overlap others."""
+        pairs = () if self.posture is None else self.posture.self_contacts
+        return frozenset(link for pair in pairs for link in pair)
+
+    @cached_property
     def cable_colors(self) -> list[Color]:
         """Red, green and blue, 0 to 255, of each cable by its tension; grey if unknown."""
         if self.tensions is None:
@@ -110,17 +151,13 @@ class Shown:
         pose = self.posture
         if pose is None or self.tensions is None or not pose.arm.has_friction:
             return np.empty((0, 2, 3)), np.empty((0, 2, 3))
-        chains = pose.segments.chains
-        if chains.paths is not None:  # holes of pulleys and sheaths have no marks yet
-            return np.empty((0, 2, 3)), np.empty((0, 2, 3))
-        sticks = can_stick(pose)
-        slides = np.zeros_like(sticks) if self.sliding is None else self.sliding
-        where = zip(chains.cable[chains.hole], chains.site, strict=True)
-        spans = np.array([pose.cable_paths[c][i : i + 2] for c, i in where])
-        along = spans[:, 1] - spans[:, 0]
-        along *= _BEAD * pose.arm.length / np.linalg.norm(along, axis=1, keepdims=True)
-        lines = spans[:, :1] + np.stack([-along, along], axis=1)
-        return lines[sticks & ~slides], lines[slides]
+        return hole_lines(pose, self.sliding)
+
+
+def loaded_point(pose: Posture, link: str) -> Array:
+    """Return where a force on a link acts (3,) [m]; without a name, at the tip."""
+    at = link_point(pose.arm, link or None)
+    return pose.tip[:3, 3] if at is None else at.position(pose)
 
 
 def show(arm: Manipulator, setting: Setting) -> Shown:
@@ -131,7 +168,7 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
         return Shown(setting=setting, status=error.status, problem=str(error))
     results: dict[str, Any] = {"setting": setting, "reference": pose}
     try:
-        force = np.concatenate([setting.force, np.zeros(3)])
+        force = loads_of(arm, setting.wrench)
         if setting.pull is not None:
             rest = cdsm.forward_statics(arm, pull=setting.pull, wrench=force)
             slides = None if rest.sliding is None else rest.sliding != 0
@@ -139,7 +176,7 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
             excess = find_excess(arm, rest.tension, setting.maximum)
             history = (rest.history,) if rest.history else ()
             return _judged(results, rest.verdict.with_findings(excess), history)
-        wrench = force * (not setting.sag)
+        wrench = np.zeros(6) if setting.sag else force
         tension = distribute_tension(pose, setting.minimum, setting.maximum, wrench)
         results["tension"] = tension
         if not setting.sag:
@@ -149,19 +186,20 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
             return _judged(results, K.verdict, () if K.is_stable else tuple(find_remedies(K)))
         locked = cdsm.stuck_stiffness if arm.has_friction else stiffness
         stable = locked(pose, tension).is_stable
-        rest, results["sliding"] = _rest(pose, tension, force)
+        rest, results["sliding"] = _rest(pose, tension, setting, force)
         results |= {"rest": rest, "stiffness": rest.stiffness}
         _ = rest.compliance
         findings = list(find_excess(arm, rest.tension, setting.maximum))
         if not stable:
             sentence = "UNSTABLE: without the force, the arm moves away from this posture"
             findings.append(Finding(Status.MOVED, sentence))
-        elif not arm.has_friction and force.any():
+        elif not arm.has_friction and acts(force):
             locked_arm = LockedArm(pose, tension.values, np.zeros(6))
             findings += _buckling(events_under(locked_arm, force, tension.maximum_held))
         return _judged(results, rest.verdict.with_findings(findings))
     except CdsmError as error:
-        return Shown(**results, status=error.status, problem=str(error))
+        problem = "\n".join([str(error), *pose.remarks])
+        return Shown(**results, status=error.status, problem=problem)
 
 
 def _judged(results: dict[str, Any], verdict: Verdict, notes: Sequence[object] = ()) -> Shown:
@@ -181,12 +219,13 @@ def _buckling(events: Sequence[Event]) -> Iterator[Finding]:
 
 
 def _rest(
-    pose: Posture, tension: Tension, wrench: Array
+    pose: Posture, tension: Tension, setting: Setting, wrench: Applied
 ) -> tuple[Equilibrium, NDArray[np.bool_] | None]:
     """Return the equilibrium under a load with locked motors, and the holes where cables slide."""
     if not pose.arm.has_friction:
         return cdsm.equilibrium(pose, tension, wrench), None
-    history = cdsm.load_cycle(pose, tension, wrench[None])
+    row = np.concatenate([setting.force, np.zeros(3)])[None]
+    history = cdsm.load_cycle(pose, tension, {setting.link: row} if setting.link else row)
     rest = Equilibrium(
         reference=pose,
         reference_tension=tension.values,

@@ -158,10 +158,18 @@ def test_a_client_changes_nothing_of_a_control_but_its_value(view: View) -> None
             enemy.change(force._impl.uuid, updates)
         for value in (math.nan, math.inf, "7", None, True, [1.0], {}):
             enemy.change(force._impl.uuid, {"value": value})
-        text = view._panel._text._impl.uuid
+        text = view._panel._head._impl.uuid
         for control, value in ((text, 1.0), ("no such", 1.0), (switch._impl.uuid, "true")):
             enemy.change(control, {"value": value})
+        link = view._panel._link
+        assert link is not None
+        for value in ("no such link", "", 1.0, None, ["link1"]):  # not among its options
+            enemy.change(link._impl.uuid, {"value": value})
+        buttons = enemy.control("all")
+        enemy.change(buttons, {"value": "Self-destruct"})
         settle(view, enemy)
+        assert link.value == "the tip"
+        assert view._panel.steps.value != "Self-destruct"
         assert vars(force._impl) == before
         assert switch.value is False
         enemy.change(switch._impl.uuid, {"value": True})  # what everybody may do
@@ -170,7 +178,7 @@ def test_a_client_changes_nothing_of_a_control_but_its_value(view: View) -> None
         for value, kept in ((1e300, most), (-(2**63), -most), (3, 3.0)):  # within its range
             enemy.change(force._impl.uuid, {"value": value})
             wait_for(lambda kept=kept: view.shown.setting.force[2] == kept)
-        enemy.change(enemy.control("all"), {"value": "Reset"})
+        enemy.change(buttons, {"value": "Reset"})
         wait_for(lambda: not view.shown.setting.sag)
 
 

@@ -10,9 +10,10 @@ import pytest
 import cdsm
 from cdsm.status import Status
 from cdsm.support.values import Array
-from cdsm.view.panel import python_text, results_text, tensions_text
+from cdsm.view.saving import python_text
 from cdsm.view.scene import Scene
 from cdsm.view.state import Setting, Shown, show
+from cdsm.view.texts import answer_text, head_text, tensions_text
 from tests.core.test_posture import ring
 from tests.support import foreign
 from tests.support.arms import readme_geometry
@@ -51,12 +52,12 @@ def sagged(
 def text(shown: Shown) -> str:
     scene = Scene.__new__(Scene)
     scene.cell, scene.force_scale = 0.01, 0.01
-    return results_text(shown, scene)
+    return head_text(shown) + answer_text(shown, scene)
 
 
 def numbers(shown: Shown) -> dict[str, str]:
     """The numbers that the page shows, by what they are."""
-    return dict(re.findall(r"^\| ([^|]+) \| ([^|]+) \|", text(shown), re.MULTILINE))
+    return dict(re.findall(r"<tr><td>(.*?)</td><td[^>]*>(.*?)</td>", text(shown)))
 
 
 def along(K: cdsm.Stiffness) -> str:
@@ -119,7 +120,7 @@ def test_names_and_messages_are_text_and_not_markup() -> None:
     shown = show(arm, Setting(q=foreign.POSTURE, minimum=0.0, force=np.zeros(3)))
     for written in (text(shown), tensions_text(shown)):
         assert "<b>*" not in written
-        assert "&#60;b&#62;&#42;" in written
+        assert "&lt;b&gt;*" in written
 
 
 def test_what_is_shown_is_the_equilibrium_of_the_arm_tensioned_without_the_force() -> None:
@@ -145,7 +146,7 @@ def test_what_is_shown_is_the_equilibrium_of_the_arm_tensioned_without_the_force
     said = numbers(shown)
     assert said["displacement"] == ", ".join(f"{1e3 * x:z.1f}" for x in rest.displacement)
     assert said["stiffness along x, y, z"] == along(rest.stiffness)
-    listed = re.findall(r"\| (\S+) \| &nbsp;N", tensions_text(shown))
+    listed = re.findall(r"([^>]+) N \w*</span></div>", tensions_text(shown))
     assert listed == [f"{F:.4g}" for F in rest.tension]
     sticking, sliding = stuck.holes
     assert 0 < np.count_nonzero(history.sliding[0]) == len(sliding)
@@ -160,7 +161,7 @@ def test_what_is_shown_is_the_equilibrium_of_the_arm_tensioned_without_the_force
 def ran(arm: cdsm.Manipulator, at: Setting) -> dict[str, Any]:
     """What the lines of Python on the page name."""
     names: dict[str, Any] = {"arm": arm, "cdsm": cdsm}
-    exec(python_text(arm, at).split("```")[1], names)
+    exec(python_text(arm, at), names)
     return names
 
 
