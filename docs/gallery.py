@@ -74,7 +74,7 @@ def write() -> None:
             printed = run(name, Path(folder))
             picture = Image.open(Path(folder, f"{name}.png")).convert("RGB")
             size = WIDTH, round(WIDTH * picture.height / picture.width)
-            smaller = picture.resize(size, Image.Resampling.LANCZOS).quantize(64)
+            smaller = picture.resize(size, Image.Resampling.LANCZOS).quantize(200)
             smaller.save(PICTURES / f"{name}.png", optimize=True)
             page += ENTRY.format(title=title_of(name), name=name, printed=printed)
     PAGE.write_text(page, encoding="utf-8")
