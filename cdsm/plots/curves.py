@@ -20,6 +20,7 @@ from cdsm.plots.style import MM, N_PER_MM, Panels
 from cdsm.posture import Posture
 from cdsm.quantities import QUANTITIES, display_of, si_of
 from cdsm.statics.buckling import critical_tension
+from cdsm.statics.events import first_slips
 from cdsm.statics.hung_loads import total_force
 from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
@@ -377,9 +378,11 @@ def plot_weight_test(test: WeightTest, ax: Axes | None = None, *, title: str | N
     what = test.point.link if test.point else "the tip"
     along = f"displacement of {what} along {style.direction_name(u)} [mm]"
     panel.set(xlabel=along, ylabel="weight [N]")
+    told = first_slips(test.events)
     events = [
         _Mark(float(displacement), event.load, event.kind, str(event))
         for event, displacement in zip(test.events, bends, strict=True)
+        if event in told
     ]
     _draw_events(panel, events)
     question = f"how far does {force:.4g} N move {test.point.link if test.point else 'its tip'}?"
@@ -438,7 +441,7 @@ def plot_load_history(
     of = "" if what == "tip" else f" of {what}"
     along = f"displacement{of} along {style.direction_name(u)} [mm]"
     panel.set(xlabel=along, ylabel="force [N]")
-    _draw_events(panel, list(_slips(history, force, moved)), lowest=True)
+    _draw_events(panel, list(_cycle_events(history, force, u)), lowest=True)
     style.set_title(panel, title, f"{name}: what does friction take?")
     return panel
 
@@ -454,12 +457,20 @@ def _last_cycle(force: Array, moved: Array) -> int | None:
     return None
 
 
-def _slips(history: LoadHistory, force: Array, moved: Array) -> Iterable[_Mark]:
-    """Yield where the first hole slides, and the first one after the force turned back."""
-    sliding = np.append(0, (history.sliding != 0).sum(axis=1))
-    begins = np.flatnonzero((sliding[1:] > 0) & (sliding[:-1] == 0)) + 1
-    for k, words in zip(begins.tolist(), ("holes slide", "slide back"), strict=False):
-        yield _Mark(float(moved[k]), float(force[k]), "slip", f"{words} at {force[k]:.3g} N")
+def _cycle_events(history: LoadHistory, force: Array, u: Array) -> Iterable[_Mark]:
+    """Yield the events; of slips the first one, and the first one after the force turned back."""
+    begins = {1.0: "holes slide", -1.0: "slide back"}
+    growing = np.sign(force[abs(force).argmax()])
+    moves = MM * history.event_displacements @ u
+    for event, moved in zip(history.events, moves.tolist(), strict=True):
+        assert event.step is not None
+        before, after = force[event.step : event.step + 2]
+        words = str(event).partition(" at ")[0]
+        if event.kind == "slip":
+            words = begins.pop(float(growing * np.sign(after - before)), "")
+        there = float(before + event.share * (after - before))
+        if words:
+            yield _Mark(moved, there, event.kind, f"{words} at {there:.3g} N")
 
 
 def _draw_events(panel: Axes, events: Sequence[_Mark], lowest: bool = False) -> None:

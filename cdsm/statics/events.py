@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
-from typing import Final, Literal, NamedTuple, final
+from typing import Final, Generic, Literal, NamedTuple, Protocol, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,12 @@ from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.pieces import PRECISION, Model, Stage, dip, equilibrium_near, slope, stage_at
 from cdsm.support.values import Array, total
 
-Kind = Literal["slack", "stop", "maximum", "law", "lift-off", "groove", "contact", "buckling"]
+Kind = Literal[
+    "slip", "slack", "stop", "maximum", "law", "lift-off", "groove", "contact", "buckling"
+]
 
 _WORDS: Final[dict[Kind, str]] = {
+    "slip": "{} begins to slide",
     "slack": "{} goes slack",
     "stop": "{} reaches its stop",
     "maximum": "{} passes its maximum tension",
@@ -48,56 +51,92 @@ class Event:
     """What changes how an arm carries a growing load, and the load at which it does.
 
     Attributes:
-        kind: ``"slack"``: a cable loses its tension; ``"stop"``: a joint reaches its limit;
-            ``"maximum"``: a tension passes the largest one of its cable; ``"law"``: a tension
-            leaves the domain of the law of its wire; ``"lift-off"`` and ``"contact"``: a cable
-            leaves or touches a pulley, and K_θ has a step; ``"groove"``: it leaves a groove beside
-            its plane, and its length has a step; ``"buckling"``: K_θ is no longer positive
-            definite.
-        place: Name of the cable or joint; for buckling, of the joint that moves most; for a pulley,
-            of its cable and its link.
-        share: Share of the load (and pull) [-].
-        load: Magnitude of the growing force [N]; 0 if no force grows.
+        kind: ``"slip"``: a cable begins to slide in a hole with friction; ``"slack"``: a cable
+            loses its tension; ``"stop"``: a joint reaches its limit; ``"maximum"``: a tension
+            passes the largest one of its cable; ``"law"``: a tension leaves the domain of the law
+            of its wire; ``"lift-off"`` and ``"contact"``: a cable leaves or touches a pulley, and
+            K_θ has a step; ``"groove"``: it leaves a groove beside its plane, and its length has a
+            step; ``"buckling"``: K_θ is no longer positive definite.
+        place: Name of the cable, hole or joint; for buckling, of the joint that moves most; for a
+            pulley, of its cable and its link.
+        share: Share of the load (and pull) [-]; in a load cycle, of the step to a load.
+        load: Magnitude of the growing force [N]; 0 if no force grows. In a load cycle, of the sum
+            of all forces.
+        step: In a load cycle, the number of the load at which the step ends.
     """
 
     kind: Kind
     place: str
     share: float
     load: float
+    step: int | None = None
 
     def __str__(self) -> str:
         where = f"at {self.load:.4g} N" if self.load else f"at {100.0 * self.share:.4g} % of it"
         where = where if self.share else "at once"
+        where += "" if self.step is None else f" in the step to load {self.step}"
         return f"{_WORDS[self.kind].format(self.place)} {where}"
 
     def to_dict(self) -> dict[str, object]:
         """Return it for JSON: the load in N."""
         entries = asdict(self)
         entries["load_N"] = entries.pop("load")
+        if self.step is None:
+            del entries["step"]
         return entries
 
 
 _SHOWN = 8  # most events in a text
 
 
+def first_slips(events: Sequence[Event]) -> list[Event]:
+    """Return the events without the slips after the first one of each step."""
+    steps = set[int | None]()
+    told = list[Event]()
+    for event in events:
+        if event.kind == "slip" and event.step in steps:
+            continue
+        steps |= {event.step} if event.kind == "slip" else set()
+        told.append(event)
+    return told
+
+
 def events_text(events: Sequence[Event], about: str = "on the way") -> list[str]:
-    """Return a line that names the events, or nothing if there are none."""
-    words = [str(event) for event in events[:_SHOWN]]
-    if len(events) > _SHOWN:
-        words.append(f"and {len(events) - _SHOWN} more events")
+    """Return a line that names the events, or nothing if there are none.
+
+    Of many holes in which cables begin to slide, it names the first.
+    """
+    slips = [event for event in events if event.kind == "slip"]
+    told = [event for event in events if event.kind != "slip" or event is slips[0]]
+    words = [str(event) for event in told[:_SHOWN]]
+    if slips and slips[0] in told[:_SHOWN] and len(slips) > 1:
+        words[told.index(slips[0])] += f", the first of {len(slips)} slips"
+    if len(told) > _SHOWN:
+        words.append(f"and {len(told) - _SHOWN} more events")
     return [f"{about}: {'; '.join(words)}"] if words else []
 
 
-class Watched(NamedTuple):
+class HasShare(Protocol):
+    """An equilibrium under a share of a load."""
+
+    @property
+    def share(self) -> float:
+        """The share [-]."""
+
+
+S = TypeVar("S", bound=HasShare)
+
+
+class Watched(NamedTuple, Generic[S]):
     """Quantities (m,) that become negative at an event, what they are, and their scales."""
 
     kinds: tuple[Kind, ...]
     places: tuple[str, ...]
-    value: Callable[[Stage], Array]
-    scale: Callable[[Stage], Array]
+    value: Callable[[S], Array]
+    scale: Callable[[S], Array]
 
 
-def watched(arm: LockedArm, maximum: Array | None = None) -> Watched:
+def watched(arm: LockedArm, maximum: Array | None = None) -> Watched[Stage]:
     """Return what an arm without friction is watched for, while its load grows.
 
     ``maximum`` (C,) [N] are the largest tensions; None: the cables' own.
@@ -155,7 +194,7 @@ def mass_of(arm: Manipulator, u: Array, force: float) -> float | None:
 
 
 def events_on(
-    model: Model, branch: Sequence[Stage], watch: Watched, force: float, goal: float
+    model: Model, branch: Sequence[Stage], watch: Watched[Stage], force: float, goal: float
 ) -> tuple[Event, ...]:
     """Locate the events on a branch of equilibria, in the order of their loads.
 
@@ -224,7 +263,12 @@ def buckling_joint(K: Array, out: NDArray[np.bool_], names: Sequence[str]) -> st
 
 
 def _within(
-    model: Model, here: Stage, there: Stage, watch: Watched, force: float, depth: int = _DEPTH
+    model: Model,
+    here: Stage,
+    there: Stage,
+    watch: Watched[Stage],
+    force: float,
+    depth: int = _DEPTH,
 ) -> list[Event]:
     """Return the events between two equilibria of a branch."""
 
@@ -240,13 +284,28 @@ def _within(
                 *_within(model, here, middle, watch, force, depth - 1),
                 *_within(model, middle, there, watch, force, depth - 1),
             ]
-    return _crossings(at, here, there, watch, force)
+    events = list[Event]()
+    for i, share in crossings(at, here, there, watch):
+        kind = watch.kinds[i]
+        if kind == "lift-off":
+            pulley = i - watch.kinds.index("lift-off")
+            before = max(here.share, share - _JUST * (there.share - here.share))
+            kind = "groove" if is_beside_groove(at(before).pose, pulley) else kind
+        events.append(Event(kind, watch.places[i], share, share * force))
+    return events
 
 
-def _crossings(
-    at: Callable[[float], Stage], here: Stage, there: Stage, watch: Watched, force: float
-) -> list[Event]:
-    """Return the events where quantities become negative between two equilibria of a branch."""
+def crossings(
+    at: Callable[[float], S],
+    here: S,
+    there: S,
+    watch: Watched[S],
+    precision: float = PRECISION,
+) -> list[tuple[int, float]]:
+    """Return which quantities become negative between two equilibria, and the shares.
+
+    ``precision`` is that of a share, relative to the step.
+    """
     from scipy.optimize import brentq  # slow to import
 
     low = here.share
@@ -254,30 +313,23 @@ def _crossings(
     before = watch.value(here)
     after = watch.value(there)
     none = _ROUNDING * watch.scale(here)
-    events = list[Event]()
-    stages = {low: before, high: after}
+    found = list[tuple[int, float]]()
+    known = {low: before, high: after}
 
-    def values(share: float) -> Array:
-        if share not in stages:
-            stages[share] = watch.value(at(share))
-        return stages[share]
+    def value(share: float, i: int) -> float:
+        if share not in known:
+            known[share] = watch.value(at(share))
+        return float(known[share][i])
 
     for i in np.flatnonzero((before >= -none) & (after < -none)).tolist():
         share = low
         if before[i] > none[i]:
-            share = brentq(
-                lambda way, i=i: values(way)[i], low, high, xtol=PRECISION * (high - low)
-            )
-        kind = watch.kinds[i]
-        if kind == "lift-off":
-            pulley = i - watch.kinds.index("lift-off")
-            touching = at(max(low, share - _JUST * (high - low))).pose
-            kind = "groove" if is_beside_groove(touching, pulley) else kind
-        events.append(Event(kind, watch.places[i], share, share * force))
-    return events
+            share = brentq(value, low, high, args=(i,), xtol=precision * (high - low))
+        found.append((i, share))
+    return found
 
 
-def _dip(model: Model, here: Stage, there: Stage, watch: Watched) -> float | None:
+def _dip(model: Model, here: Stage, there: Stage, watch: Watched[Stage]) -> float | None:
     """Return a share between two equilibria at which a quantity may be negative, or None."""
     step = there.share - here.share
     if not ((watch.value(here) > 0.0) & (watch.value(there) > 0.0)).any():

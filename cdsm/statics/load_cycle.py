@@ -19,6 +19,7 @@ from cdsm.loads import LoadsLike, has_loads, loads_of
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
+from cdsm.statics.events import Event, events_text
 from cdsm.statics.hung_loads import HungLoad, hung_loads, total_force
 from cdsm.statics.quasi_static import (
     NO_PATH,
@@ -27,6 +28,7 @@ from cdsm.statics.quasi_static import (
     QuasiStaticArm,
     QuasiStaticState,
 )
+from cdsm.statics.slow_events import Way, slow_events
 from cdsm.stiffness_matrix import FrictionState, Stiffness, checked_tension
 from cdsm.support.files import write_file
 from cdsm.support.format import merged, prepare_json, without_rounding
@@ -96,6 +98,36 @@ class LoadHistory(Result, Plotted):
     stop_torque: Array = field(metadata=unit("torque", "load", "joint"))
     dissipated: Array = field(metadata=unit("J", "load"))
     snaps: NDArray[np.bool_] = field(metadata=unit("1", "load"))
+    way: Way
+
+    @cached_property
+    def _located(self) -> tuple[tuple[Event, ...], Array]:
+        return slow_events(self.way, self.holes)
+
+    @quantity("1")
+    def events(self) -> tuple[Event, ...]:
+        """What happens on the way, in its order; located when first asked for.
+
+        Holes in which a cable begins to slide, cables that go slack, pass their maximum or leave
+        their law in any segment, joints that reach their stops, losses of stability. They are
+        roots within the sub-steps; what begins and ends within one sub-step is not seen.
+        """
+        return self._located[0]
+
+    @quantity("joint", "event", "joint")
+    def event_angles(self) -> Array:
+        """Joint coordinates at each event (m, nv) [rad]."""
+        return self._located[1]
+
+    @quantity("m", "event", "axis")
+    def event_displacements(self) -> Array:
+        """Displacement at each event (m, 3) [m]: of the tip, or of the point of the only load."""
+        poses = [self.arm.at(q, check_limits=False) for q in self.event_angles]
+        point = self.on_links[0].point if self.read[0] != "tip" else None
+        places = [pose.tip[:3, 3] if point is None else point.position(pose) for pose in poses]
+        start = self.reference
+        before = start.tip[:3, 3] if point is None else point.position(start)
+        return frozen(np.array(places).reshape(-1, 3) - before)
 
     @property
     def arm(self) -> Manipulator:
@@ -224,6 +256,7 @@ class LoadHistory(Result, Plotted):
         links = [hung.point.link for hung in self.on_links]
         rows += [f"loads on {listed(links)}"] * several
         rows.append(f"{self.sliding.shape[1]} holes; in all {lost:.4g} mJ lost in the holes")
+        rows += events_text(self.events)
         return "\n".join(rows)
 
     def to_dict(self) -> dict[str, object]:
@@ -393,15 +426,16 @@ def approach(
     """
     pose = arm.reference
     none = np.zeros(pose.q.size)
+    loads = tuple(Action(goal.wrench, none, goal.motors) for goal in goals)
     states = []
     steps = []
     state = start
     for k, goal in enumerate(show_progress(goals, "loads")):
-        load = Action(goal.wrench, none, goal.motors)
         known = near[k] if near else NO_PATH
-        state, step = arm.step_to(state, load, goal.substeps, goal.what, known)
+        state, step = arm.step_to(state, loads[k], goal.substeps, goal.what, known)
         states.append(state)
         steps.append(step)
+    paths = tuple(step.path for step in steps)
     hole = pose.segments.chains.hole
     rough = pose.segments.chains.friction > 0.0
     arms = [state.arm_state for state in states]
@@ -423,8 +457,9 @@ def approach(
         stop_torque=frozen(np.array([state.stop_torque for state in states])),
         dissipated=frozen(np.array([step.dissipated for step in steps])),
         snaps=frozen(np.array([step.snapped for step in steps])),
+        way=Way(arm, start, loads, tuple(goal.substeps for goal in goals), paths),
     )
-    return history, tuple(step.path for step in steps)
+    return history, paths
 
 
 def _taken_in(motors: ArrayLike, pose: Posture, count: int) -> Array:

@@ -9,7 +9,7 @@ computes the tensions at any posture nearby. ∂r/∂q is not symmetric where ca
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -51,6 +51,7 @@ class ChainArmState(ArmState):
 
     chain: ChainState
     slope: Array  # ∂T/∂q (S, nv) [N/rad]
+    lengths: Array  # of the segments (S,), the first ones longer as motors yield [m]
 
 
 class QuasiStaticState(NamedTuple):
@@ -69,6 +70,16 @@ class Step(NamedTuple):
     dissipated: float  # work lost to friction in the holes [J]
     snapped: bool  # whether the arm jumped
     path: EquilibriumPath  # the equilibria at the ends of the sub-steps
+
+
+class Substep(NamedTuple):
+    """A part of a step, at whose end an equilibrium is found from that at its start."""
+
+    before: QuasiStaticState
+    after: QuasiStaticState
+    begin: float  # parts of the step
+    end: float
+    snapped: bool  # whether the arm jumped
 
 
 class QuasiStaticArm:
@@ -116,6 +127,7 @@ class QuasiStaticArm:
         substeps: int,
         what: str,
         near: EquilibriumPath = NO_PATH,
+        seen: Callable[[Substep], None] = lambda substep: None,
     ) -> tuple[QuasiStaticState, Step]:
         """Change the load of an equilibrium to ``load`` in equal sub-steps.
 
@@ -123,7 +135,7 @@ class QuasiStaticArm:
         halved further, the arm jumps to the next stable one. Raises EquilibriumError if there is
         none, and ElasticityRangeError if a tension of the new state is outside its law. The error
         texts call the step ``what``. The search for an equilibrium begins at that of the path
-        ``near``, such as of a similar arm, where it has one.
+        ``near``, such as of a similar arm, where it has one. ``seen`` is told of each sub-step.
         """
         state = before
         motion = np.zeros_like(before.x)
@@ -137,10 +149,11 @@ class QuasiStaticArm:
             goal = done + part if done + 1.5 * part < 1.0 else 1.0
             target = before.load.interpolate(load, goal)
             old = state.arm_state
-            f = self._balance(state, target)
+            f = self.balance(state, target)
             known = [near[goal]] if goal in near else []
             guesses = [*known, state.x + motion, state.x]
             point: Point | None = continued(f, guesses, old.pose.q)
+            jumps = point is None
             if point is None and goal - done > _SHORTEST:
                 part = (goal - done) / 2.0
                 motion = 0.0 * motion
@@ -156,7 +169,9 @@ class QuasiStaticArm:
             again = now * last > 0.0  # these holes slid the same way before
             dissipated += float(np.where(again, (start + end) / 2.0, end) @ now)
             motion = point.x - state.x
+            last_state = state
             state = QuasiStaticState(target, new, point.x, point.stop_torque)
+            seen(Substep(last_state, state, done, goal, jumps))
             path[goal] = point.x
             slip = slip + now
             last = now
@@ -165,7 +180,7 @@ class QuasiStaticArm:
         self._require_domains(state.arm_state.tension, what)
         return state, Step(slip, dissipated, snapped, path)
 
-    def _balance(self, before: QuasiStaticState, load: Action) -> Balance:
+    def balance(self, before: QuasiStaticState, load: Action) -> Balance:
         """Return the normal map of the states that follow ``before`` under a load."""
         old = before.arm_state
         rest_length = before.arm_state.chain.rest_length.copy()
@@ -200,7 +215,7 @@ class QuasiStaticArm:
         K = segments.active(T) + J.T @ slope + stiffness_of(terms, pose)
         residual = T @ J + torque_of(terms, pose)
         scale = T @ abs(J) + torque_size_of(terms, pose)
-        return ChainArmState(pose, T, residual, K, scale, chain, slope)
+        return ChainArmState(pose, T, residual, K, scale, chain, slope, lengths)
 
     def _pulled(self, lengths: Array, rest_length: Array, forced: Array, near: Array) -> Array:
         """Return lengths (S,) of segments, the first of each cable longer as motors yield."""
@@ -228,6 +243,19 @@ class QuasiStaticArm:
         ends = np.zeros((chain.tension.size, len(self.start) - 1))
         ends[self.start[:-1], np.arange(len(self.start) - 1)] = 1.0
         return chain_tangent(self.start, self.forced, chain, ends, np.zeros_like(ends))
+
+    def continued_tensions(self, state: ChainArmState) -> Array:
+        """Compute the tension at the motor of each cable (C,) [N], negative of a slack one.
+
+        There it is minus the surplus of wire over the compliance of the cable.
+        """
+        chain = state.chain
+        needed = self._problem.rest_lengths(state.lengths, 0.0 * chain.tension)
+        first = self.start[:-1]
+        surplus = np.add.reduceat(chain.rest_length - needed, first)
+        F = chain.tension[first]
+        slack = (F == 0.0) & ~self.forced
+        return np.where(slack, -surplus / np.add.reduceat(chain.compliance, first), F)
 
     def _jumps(self, state: ChainArmState) -> Array:
         """Return the work per slip (S,) [N] that the hole after each segment dissipates."""

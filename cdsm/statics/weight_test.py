@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import final
 
 import numpy as np
@@ -52,10 +52,8 @@ class WeightTest(Result, Plotted):
             that slides first; None for an arm without friction, and if the test goes on from a
             rest with friction: there some cables are about to slide already.
         history: States with friction; load 0 is the arm without the weight. None without friction.
-        events: What changes how the arm carries the weight, in the order of the loads: cables that
-            go slack, stops, maxima, ends of laws. Empty with friction, where ``breakaway``,
-            :attr:`sliding_load` and ``history.sliding`` say when cables slide.
-        event_displacements: Displacement of the tip at each event (m, 3) [m], as ``displacements``.
+        smooth_events: Events without friction; see :attr:`events`.
+        smooth_displacements: Displacement of the tip at each of them (m, 3) [m].
         point: Where the weight hangs and the displacement is read; None: the tip.
     """
 
@@ -68,10 +66,8 @@ class WeightTest(Result, Plotted):
     states: tuple[Equilibrium, ...]
     breakaway: Breakaway | None = None
     history: LoadHistory | None = None
-    events: tuple[Event, ...] = field(default=(), metadata=unit("1"))
-    event_displacements: Array = field(
-        default_factory=lambda: frozen(np.empty((0, 3))), metadata=unit("m", "event", "axis")
-    )
+    smooth_events: tuple[Event, ...] = ()
+    smooth_displacements: Array = field(default_factory=lambda: frozen(np.empty((0, 3))))
     point: LinkPoint | None = None
 
     @property
@@ -94,6 +90,41 @@ class WeightTest(Result, Plotted):
             return frozen(np.array(places[1:]) - places[0])
         start = self._position(self.unloaded.pose)
         return frozen(np.array([self._position(state.pose) for state in self.states]) - start)
+
+    @quantity("1")
+    def events(self) -> tuple[Event, ...]:
+        """What changes how the arm carries the weight, in the order of the loads.
+
+        Cables that go slack, stops, maxima, ends of laws; with friction, cables that begin to slide
+        in a hole, which ``breakaway`` gives to first order.
+        """
+        if self.history is None:
+            return self.smooth_events
+        size = float(np.linalg.norm(self.force))
+        shares = [
+            (event, (event.step - 1 + event.share) / len(self.states))
+            for event in self.history.events
+            if event.step
+        ]
+        return tuple(
+            replace(event, share=share, load=share * size, step=None) for event, share in shares
+        )
+
+    @quantity("m", "event", "axis")
+    def event_displacements(self) -> Array:
+        """Displacement of the tip, or ``point``, at each event (m, 3) [m], as ``displacements``."""
+        history = self.history
+        if history is None:
+            return self.smooth_displacements
+        arm = history.arm
+        start = self._position(history.pose(0))
+        pairs = zip(history.events, history.event_angles, strict=True)
+        moves = [
+            self._position(arm.at(q, check_limits=False)) - start
+            for event, q in pairs
+            if event.step
+        ]
+        return frozen(np.array(moves).reshape(-1, 3))
 
     def _position(self, pose: Posture) -> Array:
         """Return where the weight hangs (3,) [m]."""
@@ -196,7 +227,8 @@ class WeightTest(Result, Plotted):
             sentences.append(f"LEFT ITS REFERENCE: {left}")
         if not self.unloaded.stable:
             sentences.append("NEUTRAL: before the weight, not every joint is brought back")
-        snaps = [event for event in self.events if event.kind == "buckling"]
+        snaps = [event for event in self.smooth_events if event.kind == "buckling"]
+        snaps = [] if history else snaps
         sentences += [
             f"SNAPS THROUGH: at {event.load:.4g} N {event.place} moves" for event in snaps
         ]
@@ -346,8 +378,8 @@ def weight_test(
         force=force,
         unloaded=unloaded,
         states=tuple(states[1:]),
-        events=events,
-        event_displacements=_displacements(model, branch, events, at),
+        smooth_events=events,
+        smooth_displacements=_displacements(model, branch, events, at),
         point=at,
     )
     if math.isinf(test.frictionless) and math.isfinite(test.tangent):
@@ -380,7 +412,9 @@ def _displacements(
     return frozen(np.array(moves).reshape(-1, 3))
 
 
-def _buckled(model: Model, branch: list[Stage], watch: Watched, force: Array) -> EquilibriumError:
+def _buckled(
+    model: Model, branch: list[Stage], watch: Watched[Stage], force: Array
+) -> EquilibriumError:
     """Return the error of an arm that buckles before it bears ``force`` (3,) [N]."""
     size = float(np.linalg.norm(force))
     *events, end = events_on(model, branch, watch, size, 1.0)

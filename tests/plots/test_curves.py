@@ -198,8 +198,13 @@ def test_area_of_the_loop_is_the_work_lost(history: Any) -> None:
     require_all([(numbers(words(ax), "{} lost per cycle")[0], 1e-3 * lost)], digits=3)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("displacement along z [mm]", "force [N]")
     slips = [line(ax, gid)[0] for gid in artists(ax, "event:holes slide")]
-    first = int(np.flatnonzero((history.sliding != 0).any(axis=1))[0])
-    np.testing.assert_allclose(slips, [[moved[first + 1], force[first + 1]]])
+    first = history.events[0]
+    load = np.array([[0.0, 0.0, first.load, 0.0, 0.0, 0.0]])
+    there = cdsm.load_cycle(history.reference, history.reference_tension, load)
+    np.testing.assert_allclose(slips, [[1e3 * there.displacement[0, 2], first.load]])
+    back = [line(ax, gid)[0, 1] for gid in artists(ax, "event:slide back")]
+    turned = next(event for event in history.events if (event.step or 0) > 6)
+    np.testing.assert_allclose(back, [turned.load])
     require_look(ax)
 
 
