@@ -214,15 +214,15 @@ def view(
     as_json: options.JsonOption = False,
 ) -> int:
     """Show an arm in the browser, with sliders, and its stiffness."""
+    import numpy as np
+
     with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the view, also while it starts
         robot = options.load_arm(arm, changes)
         start = None if angles is None else options.joint_coordinates(angles, robot)
-        loads = options.loads_on(robot, load)
-        force = loads.pop(robot.tip_link)
-        if loads:
-            raise misuse(
-                "--load", f"acts on {' and '.join(loads)}, but the view has one at the tip."
-            )
+        loads = {link: W for link, W in options.loads_on(robot, load).items() if W.any()}
+        if len(loads) > 1:
+            raise misuse("--load", f"acts on {' and '.join(loads)}, but the view has one force.")
+        link, force = next(iter(loads.items()), (robot.tip_link, np.zeros(6)))
         if force[3:].any():
             raise misuse("--load", "has a moment, but the view has forces only: FX,FY,FZ.")
         motion = options.Motion() if path is None else options.read_path(path, robot)
@@ -233,6 +233,7 @@ def view(
             minimum=minimum,
             maximum=math.inf,
             force=force[:3],
+            link=None if link == robot.tip_link else link,
             angles=motion.angles,
             tips=motion.tips,
         ) as page:

@@ -16,13 +16,14 @@ from typing import Final, Generic, Literal, NamedTuple, Protocol, TypeVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.applied import Applied, as_loads, combined, scaled
+from cdsm.applied import Applied, combined, scaled
 from cdsm.manipulator import Manipulator
 from cdsm.statics.contact_events import contact_angles, contact_names, is_beside_groove
 from cdsm.statics.continuation import follow
+from cdsm.statics.hung_loads import total_force
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.pieces import PRECISION, Model, Stage, dip, equilibrium_near, slope, stage_at
-from cdsm.support.values import Array, total
+from cdsm.support.values import Array
 
 Kind = Literal[
     "slip", "slack", "stop", "maximum", "law", "lift-off", "groove", "contact", "buckling"
@@ -249,7 +250,7 @@ def events_under(arm: LockedArm, load: Applied, maximum: Array) -> tuple[Event, 
 
     start = stage_at(model, arm.reference, np.zeros(arm.reference.q.size), 0.0)
     branch = follow(model, start, 1.0)
-    force = float(np.linalg.norm(total([part.wrench[:3] for part in as_loads(load).loads])))
+    force = float(np.linalg.norm(total_force(load)))
     return events_on(model, branch, watched(arm, maximum), force, 1.0)
 
 

@@ -20,11 +20,11 @@ from cdsm.errors import CdsmError, need
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path import checked_path
 from cdsm.status import Status
-from cdsm.support.validation import checked_quantity, instance, vector, whole_number
+from cdsm.support.validation import checked_quantity, instance, one_of, vector, whole_number
 from cdsm.support.values import Array
 from cdsm.view.curve import compute_curve
 from cdsm.view.history import History
-from cdsm.view.panel import Panel
+from cdsm.view.panel import Panel, loadable_links
 from cdsm.view.path_player import Player, tips_of
 from cdsm.view.saving import (
     command_text,
@@ -56,6 +56,7 @@ def serve(
     minimum: float = 0.0,
     maximum: float = math.inf,
     force: ArrayLike = (0.0, 0.0, 0.0),
+    link: str | None = None,
     angles: ArrayLike | None = None,
     tips: ArrayLike | None = None,
 ) -> View:
@@ -80,7 +81,8 @@ def serve(
         q: Joint angles at the start (nv,) [rad]; by default zero, or the nearest joint limit.
         minimum: Lower bound of all tensions at the start [N].
         maximum: Upper bound of all tensions [N].
-        force: Force at the tip at the start, in base axes (3,) [N].
+        force: Force at the start, in base axes (3,) [N].
+        link: Link on which it acts: at the centre of its disk, or its frame. None: at the tip.
         angles: A path to play, as joint angles (S, nv) [rad]; the arm starts at the first.
         tips: A path to play, as tip positions (S, 3) [m]; give only one kind of path.
 
@@ -106,7 +108,8 @@ def serve(
         q=arm.checked_angles(straight if q is None else q),
         minimum=checked_quantity("minimum", minimum, "tension", zero=True),
         maximum=checked_quantity("maximum", maximum, "tension", infinite=True),
-        force=vector("force", force, 3, "force at the tip [N], base axes"),
+        force=vector("force", force, 3, "force [N], base axes"),
+        link="" if link in (None, arm.tip_link) else one_of("link", link, loadable_links(arm)),
         pull=np.zeros(len(arm.cables)) if pulled else None,
     )
     with contextlib.redirect_stdout(None):  # viser prints addresses

@@ -77,7 +77,7 @@ class Panel:
             self.names = self._add_switch("show names", False, "Name the cables in the picture.")
             self.curve = CurveChart(gui, changed)
         with tabs.add_tab("Load"):
-            self._link = self._add_links(arm)
+            self._link = self._add_links(arm, start.link)
             for axis, value in zip("xyz", start.force.tolist(), strict=True):
                 ends = (-self.largest_force, self.largest_force)
                 self._load.append(self.add_slider(f"force {axis} [N]", *ends, value))
@@ -108,12 +108,13 @@ class Panel:
         ]
         return joints, [], unit
 
-    def _add_links(self, arm: Manipulator) -> viser.GuiDropdownHandle[str] | None:
+    def _add_links(self, arm: Manipulator, start: str) -> viser.GuiDropdownHandle[str] | None:
         """Add the choice of the link on which the force acts, if there are several."""
         names = [_AT_TIP, *loadable_links(arm)]
         if len(names) == 1:
             return None
-        chosen = self._gui.add_dropdown("force at", names, hint=_LINK)
+        first = start or _AT_TIP
+        chosen = self._gui.add_dropdown("force at", names, initial_value=first, hint=_LINK)
         chosen.on_update(lambda _: self._changed())
         return chosen
 

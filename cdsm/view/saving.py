@@ -85,8 +85,6 @@ def command_text(arm: Manipulator, setting: Setting) -> str:
             parts.append(f"--maximum={setting.maximum:.12g}")
         if setting.sag and force:
             parts[0] = "cdsm weigh ARM.toml"
-            if setting.link:
-                return "(no command hangs a weight on a link of an arm with locked motors)"
     if force:
         at = f"@{setting.link}" if setting.link else ""
         parts.append(shlex.quote(f"--load={_joined(setting.force, ',')}{at}"))

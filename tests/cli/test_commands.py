@@ -162,7 +162,7 @@ def test_weights_hang_on_links(probe: Path, pose: cdsm.Posture, tmp_path: Path) 
         ("weigh --load 0,0,1,1,0,0@link1", "a weight is a force: FX,FY,FZ. --cycles takes"),
         ("plan --direction z --mass -1@link2", "--mass: -1 kg given; give a mass from 0 kg on"),
         ("sweep --random 2 --load 1,2@link2", "--load: 2 given; give FX,FY,FZ or"),
-        ("view --load 0,0,1@link2", "acts on link2, but the view has one at the tip"),
+        ("view --load 0,0,1@link2 --load 0,1,0@link1", "on link2 and link1, but the view has one"),
     ],
 )
 def test_wrong_links_of_options_are_named(probe: Path, words: str, said: str) -> None:

@@ -320,12 +320,33 @@ def test_the_posture_is_saved_as_lines_that_compute_the_same(
         np.testing.assert_allclose(said["along_N_per_m"], [K.along(u) for u in "xyz"], rtol=1e-9)
         assert f"# stiffness along x, y, z: {along(K)} N/mm" in program
         page._panel._link.value = "link2"  # type: ignore[union-attr]
-        press(page, "save", "Posture", browser)
-        command = shlex.split(next(iter(browser.files.values())).decode().splitlines()[1][2:])
-        said = answer([command[1], str(path), *command[3:]])
-        K = page.shown.stiffness
-        assert K is not None
-        np.testing.assert_allclose(said["along_N_per_m"], [K.along(u) for u in "xyz"], rtol=1e-9)
+        for sag in (False, True):
+            page._panel._sag.value = sag
+            press(page, "save", "Posture", browser)
+            line = next(iter(browser.files.values())).decode().splitlines()[1]
+            command = shlex.split(line.removeprefix("# cdsm "))
+            said = answer([command[0], str(path), *command[2:]])
+            K, rest = page.shown.stiffness, page.shown.rest
+            assert K is not None
+            if rest is None:
+                along_axes = [K.along(u) for u in "xyz"]
+                np.testing.assert_allclose(said["along_N_per_m"], along_axes, rtol=1e-9)
+            else:  # where the weight hangs
+                moved = page.shown.moved_point
+                assert command[0] == "weigh"
+                np.testing.assert_allclose(said["displacements_m"][-1], moved, rtol=1e-6)
+
+
+def test_a_force_may_start_on_a_link() -> None:
+    options: dict[str, Any] = {"port": 0, "minimum": STABLE, "force": (0.0, 0.0, -0.5)}
+    with serve(soft_arm(), link="link1", **options) as page:
+        assert page.shown.setting.link == "link1"
+        assert page._panel._link is not None
+        assert page._panel._link.value == "link1"
+    with serve(soft_arm(), link="tool0", **options) as page:
+        assert page.shown.setting.link == ""
+    with pytest.raises(cdsm.CdsmError, match="base_link"):
+        serve(soft_arm(), link="base_link", **options)
 
 
 def test_the_picture_is_an_svg_of_what_the_browser_shows(view: View) -> None:
