@@ -14,6 +14,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import FancyArrowPatch, Polygon
 from numpy.typing import ArrayLike
 
+from cdsm.applied import Applied, PointLoad, all_loads, tip_part
 from cdsm.errors import InvalidInput
 from cdsm.plots import style
 from cdsm.plots.projection import VIEW, Drawing
@@ -46,6 +47,7 @@ class Scene(NamedTuple):
     compliance: Array | None  # of the tip (6, 6), None if not asked for or not stable
     warnings: tuple[str, ...]  # why numbers mean little
     before: Posture | None  # drawn pale below
+    hung: tuple[PointLoad, ...] = ()  # loads on links
 
 
 @style.styled
@@ -194,14 +196,14 @@ def _scene(
     """Check the arguments of :func:`plot_arm`, and return what they ask to draw."""
     before = compliance = None
     warnings: tuple[str, ...] = ()
-    load = np.zeros(3)
+    applied: Applied = np.zeros(6)
     if isinstance(pose, Equilibrium):
         rest = pose
         pose = rest.pose
         near = 0.0 < rest.moved < _LARGEST_MOVE * pose.arm.length
         before = rest.reference if near else None
         tension = rest.tension if tension is None else tension
-        load = rest.tip_wrench[:3]
+        applied = rest.applied
         warnings = rest.warnings
         compliance = rest.compliance if rest.stable and stiffness is None else None
     instance("pose", pose, Posture)
@@ -213,7 +215,7 @@ def _scene(
         if not K.posture.equals(pose):
             problem = "belongs to another posture or arm; compute it for this one."
             raise InvalidInput("stiffness", problem)
-        load = K.tip_wrench[:3]
+        applied = K.applied
         warnings = (*warnings, *K.warnings)
         compliance = K.compliance if K.is_stable else None
     if isinstance(tension, Tension) and tension.posture.arm != pose.arm:
@@ -221,9 +223,11 @@ def _scene(
     values = None
     if tension is not None:
         values = vector("tension", np.asarray(tension), len(pose.arm.cables), "one [N] per cable")
+    load = tip_part(applied)[:3]
     if force is not None:
         load = vector("force", force, 3, "a force [N] in base axes")
-    return Scene(pose, values, load, compliance, warnings, before)
+    hung = all_loads(pose.arm, applied).on_links
+    return Scene(pose, values, load, compliance, warnings, before, hung)
 
 
 def _question(scene: Scene) -> str:
@@ -367,18 +371,27 @@ def draw_compliance(drawing: Drawing, scene: Scene, scale: float | None) -> str:
 
 
 def draw_force(drawing: Drawing, scene: Scene) -> None:
-    """Draw the tip, and the force on it as an arrow with its size."""
+    """Draw the tip, and the forces on it and on links as arrows with their sizes."""
     tip = scene.pose.tip[:3, 3]
-    start = drawing.flat(tip)
-    drawing.ax.plot(*start, "o", ms=2.5, color=style.INK, zorder=6.5, gid="tip")
-    size = float(np.linalg.norm(scene.force))
+    drawing.ax.plot(*drawing.flat(tip), "o", ms=2.5, color=style.INK, zorder=6.5, gid="tip")
+    length = scene.pose.arm.length
+    _draw_arrow(drawing, tip, scene.force, length, "force")
+    for load in scene.hung:
+        place = load.at.position(scene.pose)
+        _draw_arrow(drawing, place, load.wrench[:3], length, f"force:{load.at.link}")
+
+
+def _draw_arrow(drawing: Drawing, place: Array, force: Array, length: float, gid: str) -> None:
+    """Draw a force (3,) [N] on a place (3,) [m] of an arm of this length, unless it is zero."""
+    size = float(np.linalg.norm(force))
     if size == 0.0:
         return
-    end = drawing.flat(tip + _ARROW * scene.pose.arm.length * scene.force / size)
+    start = drawing.flat(place)
+    end = drawing.flat(place + _ARROW * length * force / size)
     look: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 7, "lw": 1.4, "zorder": 7}
     look |= {"color": style.PURPLE, "shrinkA": 0, "shrinkB": 0}
     arrow = FancyArrowPatch(tuple(start), tuple(end), **look)
-    arrow.set_gid("force")
+    arrow.set_gid(gid)
     drawing.ax.add_patch(arrow)
     right = end[0] >= start[0]
     look = {"fontsize": 7, "color": style.DARK[style.PURPLE], "va": "center", "zorder": 8}

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.applied import Applied, Loaded, texts
+from cdsm.applied import Applied, Loaded, described, texts
 from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.loads import LoadsLike, loads_of
 from cdsm.posture import Posture
@@ -336,19 +336,25 @@ class Equilibrium(Result, Loaded):
         texts = [f"{k:.4g}" if k < _LOCKED * least else "locked" for k in values]
         return f"({', '.join(texts)})"
 
+    def _loads(self) -> dict[str, object]:
+        """Return the loads on links for JSON, if there are any."""
+        loads = described(self.pose.arm, self.applied)
+        return {"loads": loads} if loads else {}
+
     def to_dict(self) -> dict[str, object]:
         """Return the numbers in SI for JSON; with friction, those of segments and holes too."""
         if self.path is None:
             motors = self.pose.arm.motors
             turns = dict(zip(motors.names, self.motor_turns, strict=True))
-            more: dict[str, object] = {}
+            more: dict[str, object] = self._loads()
             if motors.yielding is not None:
                 more["motor_yield_rad"] = turns
             if self.commands is not None:
                 more |= motors.described(self.commands)
             return merged(super().to_dict(), prepare_json(more))
         labels = self.path.segment_names
-        followed = {
+        followed: dict[str, object] = {
+            **self._loads(),
             "segment_tension_N": dict(zip(labels, self.path.segment_tensions[-1], strict=True)),
             "sliding": dict(zip(self.path.holes, self.path.sliding[-1], strict=True)),
             "snapped": bool(self.path.snaps.any()),

@@ -80,6 +80,9 @@ ASKED: dict[str, Callable[[cdsm.Posture, Any], Any]] = {
         outputs=("along", "payload"),
     )[["along", "payload"]].to_array(),
     "uncertainty": _sure,
+    "estimate": lambda pose, W: (
+        cdsm.estimate_load(pose, F, {"tool0": "force"}, tension_std=0.5, wrench=W).loads
+    ),
 }
 
 
@@ -116,6 +119,28 @@ def test_they_are_part_of_the_definition(tmp_path: Path) -> None:
     assert all(load["of_the_arm"] for load in described)
     np.testing.assert_array_equal(K.wrench, np.zeros(6))
     assert all(check.verdict == "agrees" for check in K.report().comparisons)
+
+
+def test_pictures_have_an_arrow_for_each_load() -> None:
+    arm = universal().with_loads(GRIPPER)
+    pose = arm.at(Q)
+    K = cdsm.stiffness(pose, F, SWUNG)
+    ax = cdsm.plots.plot_arm(pose, None, K, view=(0, -90))
+    arrows = {patch.get_gid(): patch for patch in ax.patches if patch.get_gid()}
+    assert {"force", "force:link2", "force:link3"} <= arrows.keys()
+    place = pose.link_pose("link3") @ [*GRIPPER.point, 1.0]  # type: ignore[misc]
+    start, end = arrows["force:link3"]._posA_posB
+    np.testing.assert_allclose(start, 1e3 * place[[0, 2]])
+    assert end[0] == pytest.approx(start[0])
+    assert end[1] < start[1]  # down
+    assert "1.2 N" in {text.get_text() for text in ax.texts}
+    alone = cdsm.plots.plot_arm(pose)
+    assert [p.get_gid() for p in alone.patches if str(p.get_gid()).startswith("force")] == [
+        "force:link3"
+    ]
+    rest = cdsm.equilibrium(pose, F, SWUNG)
+    told: Any = rest.to_dict()["loads"]
+    assert [load["link"] for load in told] == ["link3", "link2"]
 
 
 LOADS = 'loads = [{link = "link2", force = [0, 0, -1]}, {link = "%s", %s}]\n'
