@@ -156,6 +156,33 @@ def _pulled(case: Case, _: Path) -> None:
     assert 5.0 < rest.tension.max() < 100.0
 
 
+def _turned(case: Case, _: Path) -> None:
+    """A motor that turns leaves shorter wires, and balances what acts."""
+    arm = case.arm
+    assembly = arm.assemble(case.pose, case.tension)
+    turn = 0.02 if arm.motors.given else 2e-4
+    command = {arm.motors.names[0]: turn}
+    rest = cdsm.forward_statics(arm, motors=command, assembly=assembly, wrench=case.wrench)
+    assert abs(rest.residual).max() < 1e-8
+    assert (rest.path is not None) == arm.has_friction
+    shorter = assembly.free_lengths - rest.stiffness.free_lengths
+    np.testing.assert_allclose(shorter, turn * arm.motors.matrix[:, 0], atol=1e-15)
+
+
+def _assembled(case: Case, _: Path) -> None:
+    """Tensions of an assembly balance the arm, with the wires that its motors leave."""
+    arm = case.arm
+    before = cdsm.distribute_tension(case.pose, 20.0, MAXIMUM, case.wrench)
+    assembly = arm.assemble(case.pose, before)
+    pose = arm.at(0.998 * case.pose.q)  # twins on a drum leave little choice
+    tension = cdsm.distribute_tension(pose, 0.1, MAXIMUM, case.wrench, assembly=assembly)
+    assert abs(tension.residual).max() < 1e-9
+    assert tension.values.min() > 0.1 - 1e-9
+    smooth = {"motors": tension.commands, "wrench": case.wrench, "friction": False}
+    rest = cdsm.forward_statics(arm, assembly=assembly, start=pose.q, **smooth)
+    np.testing.assert_allclose(rest.pose.q, pose.q, atol=1e-8)
+
+
 def _weighed(case: Case, _: Path) -> None:
     test = cdsm.weight_test(case.pose, case.tension, DOWN, wrench=case.wrench, link="link2")
     assert test.frictionless == pytest.approx(test.tangent, rel=1e-2)
@@ -257,6 +284,8 @@ ASKED: dict[str, Callable[[Case, Path], None]] = {
     "rest": _rest,
     "rest under held tensions": _held,
     "rest under pulls": _pulled,
+    "rest of turned motors": _turned,
+    "tensions of an assembly": _assembled,
     "weight": _weighed,
     "load cycle": _cycled,
     "stuck": _stuck,
@@ -274,12 +303,24 @@ _ROUGH = "pair yields: friction in the holes would couple all cables that it mov
 REFUSED: list[Refusal] = [
     *(
         (asked, frozenset([motors]), _FREE)
-        for asked in ("least tensions of a batch", "plan", "payload")
+        for asked in (
+            "rest under held tensions",
+            "least tensions of a batch",
+            "plan",
+            "payload",
+        )
         for motors in ("rigid motors", "yielding motors")
     ),
     *(
         (asked, frozenset(["yielding motors", "friction"]), _ROUGH)
-        for asked in ("rest under pulls", "weight", "load cycle", "stuck")
+        for asked in (
+            "rest under held tensions",
+            "rest under pulls",
+            "rest of turned motors",
+            "weight",
+            "load cycle",
+            "stuck",
+        )
     ),
     ("MuJoCo", frozenset(["yielding motors"]), "pair yields, and a model in MuJoCo has rigid"),
     ("uncertainty", frozenset(["pulleys"]), r"over\+1'?: runs over the pulley .* no errors of pul"),
