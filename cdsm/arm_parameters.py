@@ -30,13 +30,14 @@ class ArmParameters:
     - ``motor_stiffness`` k_m [N m/rad] of a motor that has one.
     - Of a cable: ``lead`` [m], ``hole_angle`` [rad], ``friction`` μ [-] in its holes, ``spring``
       [N/m] in series, ``rigidity`` [-], a factor on the EA of its law, ``slack`` [m] and ``gain``
-      [-] of its motor, and ``phase`` [rad], which is added to its hole angle.
+      [-] of its motor, ``phase`` [rad], which is added to its hole angle, and ``pulley_radius``
+      [m], which is added to the radius of each of its pulleys.
 
     ``"hole_radius"`` is that of all joints, ``"hole_radius@2"`` of the second one from the base.
     ``"lead"`` is that of all cables, ``"lead@2"`` of the cables that end at joint 2,
     ``"lead@cable2_1"`` of one cable, ``"motor_stiffness@m1"`` that of one motor. An arm from a URDF
-    has only friction, spring, rigidity, slack and gain, of all cables or of one, and its motors. A
-    call passes names with @ in a dict: ``parameters(**{"hole_radius@2": 0.025})``.
+    has only friction, spring, rigidity, slack, gain and pulley_radius, of all cables or of one, and
+    its motors. A call passes names with @ in a dict: ``parameters(**{"hole_radius@2": 0.025})``.
 
     Attributes:
         arm: The arm; parameters that are not named keep their values.
@@ -87,7 +88,7 @@ class ArmParameters:
     def present(self) -> dict[str, float]:
         """Value of each parameter in :attr:`arm`, in SI; the median if its joints differ.
 
-        A ``rigidity`` is 1 and a ``phase`` 0.
+        A ``rigidity`` is 1, a ``phase`` and a ``pulley_radius`` are 0.
         """
         return {name: float(np.median(self.values(name))) for name in self.names}
 
@@ -185,7 +186,8 @@ class ArmParameters:
         ]
         if not places:
             ends = "no cable that ends there"
-            lacks = ends if {*kinds} <= {"routes", "cables"} else parameter.lacks
+            of_cables = {*kinds} <= {"routes", "cables"} and not owners
+            lacks = ends if of_cables else parameter.lacks
             raise InvalidInput(name, f"{self.arm.name} has {lacks}.")
         return places
 

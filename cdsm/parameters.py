@@ -11,7 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, NamedTuple, TypeVar
 
+import numpy as np
+
 from cdsm.cable import Cable
+from cdsm.cable_path import Pulley, Site
+from cdsm.contacts import SURFACE
 from cdsm.geometry import CableRoute, Joint, Link
 from cdsm.motors import Motor
 from cdsm.quantities import DISPLAY
@@ -155,6 +159,34 @@ def _friction(cable: Cable) -> float:
     return max(site.friction for site in cable.sites)
 
 
+def _pulley_radius(cable: Cable) -> float | None:
+    return 0.0 if cable.pulleys else None
+
+
+def _with_rim(pulley: Pulley, site: Site, more: float) -> Site:
+    """Return a site of the link of a pulley, farther from its axis if the site is on its rim."""
+    axis = np.array(pulley.axis) / np.linalg.norm(pulley.axis)
+    apart = np.subtract(site.position, pulley.position)
+    out = apart - (axis @ apart) * axis
+    far = float(np.linalg.norm(out))
+    if abs(far - pulley.radius) > SURFACE:
+        return site
+    return replace(site, position=tuple((site.position + out * (more / far)).tolist()))
+
+
+def _with_pulleys(cable: Cable, more: float) -> Cable:
+    """Return a cable whose pulleys are larger, all by as much; sites on rims stay there."""
+    path = [*cable.sites]
+    for i, pulley in enumerate(cable.sites):
+        if isinstance(pulley, Pulley):
+            path[i] = replace(pulley, radius=pulley.radius + more)
+            for k in (i - 1, i + 1):
+                site = path[k]
+                if isinstance(site, Site) and site.link == pulley.link:
+                    path[k] = _with_rim(pulley, site, more)
+    return replace(cable, sites=tuple(path))
+
+
 def _scaled(cable: Cable, factor: float) -> Cable:
     return replace(cable, elasticity=cable.elasticity.scaled(factor))
 
@@ -225,6 +257,13 @@ PARAMETERS: Final[dict[str, Parameter]] = {
         largest=0.5,
         usual=(0.0, 1.0),
         typical=0.1,
+    ),
+    "pulley_radius": Parameter(
+        unit=METRE,
+        kinds=("cables",),
+        get=_pulley_radius,
+        set=_with_pulleys,
+        lacks="no pulleys there",
     ),
     "slack": attribute("cables", "slack", METRE, acts_under_load=False),
     "gain": attribute("cables", "gain", NUMBER, largest=0.5, acts_under_load=False),

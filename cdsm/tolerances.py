@@ -106,6 +106,7 @@ class Tolerances:
         joint_position: Coordinate of each joint that slides [m].
         tension: Each measured cable tension [N].
         lead: Straight length of each cable before the base disk [m].
+        pulley_radius: Radius of the pulleys of each cable [m], one error for all of a cable.
         slack: Wire that each motor takes in before its cable pulls [m].
         gain: Wire taken in per pull that each motor reports [-].
         motor_stiffness: k_m of each motor that has one; relative [-].

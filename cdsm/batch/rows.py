@@ -24,8 +24,8 @@ from cdsm.routing import Indices
 from cdsm.support.values import Array, frozen
 from cdsm.tension.solvers import NO_ARM
 
-CableStiffness = Callable[[Array, Array, slice], Array]
-"""Stiffness (n, C) of cables of lengths L (n, C) under F (n, C) in a slice of rows; −1 outside."""
+CableStiffness = Callable[[Array, Array, slice | Indices], Array]
+"""Stiffness (n, C) of cables of lengths L (n, C) under F (n, C) in some rows; −1 outside."""
 
 
 class Directions(NamedTuple):

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.batch.quantities import Codes
-from cdsm.batch.rows import BodyArrays, Directions, Rows, ShiftsOfRows, tables_of
+from cdsm.batch.rows import BodyArrays, CableStiffness, Directions, Rows, ShiftsOfRows, tables_of
 from cdsm.contact_shifts import Shifts
 from cdsm.contacts import TOUCHES, Contacts, Pulleys, settle_postures, settle_row
 from cdsm.routing import Indices, Spans
@@ -197,6 +197,7 @@ def _part(
         tension=None if rows.tension is None else some(rows.tension),
         bounds=None if rows.bounds is None else (some(rows.bounds[0]), some(rows.bounds[1])),
         body=body,
+        cable_stiffness=_of_chosen(rows, chosen),
         status=status[chosen],
         touches=touches,
         loads=None if rows.loads is None else rows.loads.of(chosen),
@@ -210,6 +211,15 @@ def _part(
     radial = world - np.concatenate([centre, centre], axis=1)
     touching = _Touching(radial, axis, arcs, contacts.angle, contacts.slope)
     return replace(part, shifts=_shifts(part, pattern, touching, shifted))
+
+
+def _of_chosen(rows: Rows, chosen: Indices | slice) -> CableStiffness | None:
+    """Return the function of the stiffness of cables in the ``chosen`` rows, if rows have one."""
+    stiffness = rows.cable_stiffness
+    if stiffness is None:
+        return None
+    places = np.arange(len(rows.q))[chosen]
+    return lambda L, F, part: stiffness(L, F, places[part])
 
 
 def _repeated(x: Array, count: int) -> Array:

@@ -20,7 +20,10 @@ from cdsm.support.values import Array
 Change = tuple[str, str, NDArray[np.intp], Array]
 """Source and name of an input; which numbers of the arm it changes, and how fast."""
 
-NO_PULLEYS = "tolerances know no errors of pulleys and sheaths yet."
+NO_PULLEYS = (
+    "of such an arm tolerances vary rigidity, spring, pulley_radius, joint_angle, joint_position, "
+    "tension, slack and gain alone."
+)
 """What :meth:`Cable.only_sites` says of cables that tolerances cannot vary."""
 
 _NEAR = 1e-9  # a site this near to a disk [m] is on the disk

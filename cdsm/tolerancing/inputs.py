@@ -63,9 +63,42 @@ class Inputs:
 
     def __init__(self, arm: Manipulator) -> None:
         cables = arm.cables
+        self._arm = (arm.name, _LARGEST * arm.length)
+        slides = list(compress(arm.joint_names, arm.slides))
+        self.labels: dict[str, Sequence[str]] = {
+            "rigidity": cables.names,
+            "spring": [c.name for c in cables if c.series_stiffness < math.inf],
+            "joint_angle": [name for name in arm.joint_names if name not in slides],
+            "joint_position": slides,
+            "tension": cables.names,
+        }
+        self._lacks = dict[str, str]()
+        refusal = ""
+        try:
+            for cable in cables:
+                cable.only_sites(NO_PULLEYS)
+        except InvalidInput as error:
+            refusal = str(error)
+        self._has_sites = not refusal
+        if self._has_sites:
+            self._find_dimensions(arm)
+        self.rebuilt: dict[str, Sequence[str]] = {}
+        for name in [name for name in sources() if name not in self.labels]:
+            try:
+                if name in PARAMETERS:
+                    self.rebuilt[name] = labels_of(arm, name)
+            except InvalidInput as error:
+                if arm.is_serpentine:
+                    self._lacks[name] = str(error).removeprefix(f"{name}: ")
+            if refusal and name not in self.rebuilt:
+                self._lacks[name] = refusal
+        self.labels |= self.rebuilt
+
+    def _find_dimensions(self, arm: Manipulator) -> None:
+        """Find the dimensions that are inputs, and what each one changes."""
+        cables = arm.cables
         paths = [cable.only_sites(NO_PULLEYS) for cable in cables]
         table = tables_of(arm)
-        self._arm = (arm.name, _LARGEST * arm.length)
         self._nominal = table.dimensions
         self._sprung = arm.springs.sprung
         k = self._nominal.spring
@@ -85,14 +118,8 @@ class Inputs:
             for i, site in enumerate(path, 1)
         ]
         sites = [f"{name} on {site.link}, site {i}" for name, i, site in holes]
-        slides = list(compress(arm.joint_names, arm.slides))
-        self.labels: dict[str, Sequence[str]] = {
-            "rigidity": cables.names,
-            "spring": [c.name for c in cables if c.series_stiffness < math.inf],
+        self.labels |= {
             "joint_stiffness": [arm.springs.joints[j] for j in self._sprung],
-            "joint_angle": [name for name in arm.joint_names if name not in slides],
-            "joint_position": slides,
-            "tension": cables.names,
             "friction": [name for name, e in zip(sites, holes, strict=True) if e[2].friction],
         }
         changes_of: dict[str, list[Change]] = {}
@@ -105,18 +132,10 @@ class Inputs:
             entries = np.concatenate(values), (np.concatenate(rows), columns)
             self._maps[source] = csr_matrix(entries, (self._numbers.size, len(rows)))
 
-        self.rebuilt: dict[str, Sequence[str]] = {}
-        self._lacks = dict[str, str]()
-        for name in [name for name in sources() if name in PARAMETERS and name not in self.labels]:
-            try:
-                self.rebuilt[name] = labels_of(arm, name)
-            except InvalidInput as error:
-                if arm.is_serpentine:
-                    self._lacks[name] = str(error).removeprefix(f"{name}: ")
-        self.labels |= self.rebuilt
-
-    def bodies(self, errors: Errors, count: int) -> BodyArrays:
-        """Return the dimensions of ``count`` arms with ``errors``."""
+    def bodies(self, errors: Errors, count: int) -> BodyArrays | None:
+        """Return the dimensions of ``count`` arms with ``errors``; None: no input is one."""
+        if not self._has_sites:
+            return None
         numbers = self._numbers[:, None]
         for source, matrix in self._maps.items():
             if source in errors:

@@ -19,6 +19,7 @@ from cdsm.loads import LoadsLike
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.quantities import QUANTITIES, Quantity, display_of, require_name
+from cdsm.routing import Indices
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import JointUnits, coordinates
@@ -157,7 +158,7 @@ class Measurand(ReadOnlyState):
         rebuilt = [source for source in errors if source in self.inputs.rebuilt]
         return sum((errors[source] @ _slopes(self, source) for source in rebuilt), 0.0)
 
-    def _springs(self, errors: Errors, L: Array, F: Array, part: slice) -> Array:
+    def _springs(self, errors: Errors, L: Array, F: Array, part: slice | Indices) -> Array:
         """Return stiffness with errors of springs and EA; as EA rises, ε falls: EA ε stays."""
         laws = self.stiffness.posture.arm.laws
         change = errors["rigidity"][part] if "rigidity" in errors else 0.0

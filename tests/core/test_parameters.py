@@ -11,6 +11,7 @@ import cdsm
 from cdsm.parameters import NEWTON, PARAMETERS, Parameter, Unit, attribute
 from tests.support.arms import readme_geometry
 from tests.support.foreign import crab
+from tests.support.pulleys import finger
 
 GEOMETRY = readme_geometry(joints=2, hole_radius=[0.025, 0.02])
 ARM = cdsm.Manipulator(GEOMETRY, cdsm.LinearElasticity(48e3), gravity="-y").with_friction(0.1)
@@ -41,6 +42,9 @@ def test_an_arm_with_its_own_numbers_is_equal(name: str, where: str) -> None:
     at = where if where != "@cable2_1" or "cables" in PARAMETERS[name].kinds else "@1"
     at = at.replace("@", "@m") if "motors" in PARAMETERS[name].kinds else at
     special = {"bending_stiffness": SPRUNG, "exponent": WITH_LAWS, "motor_stiffness": DRIVEN}
+    if name == "pulley_radius":  # of an arm from a URDF, whose cables have names alone
+        special[name] = finger()
+        at = where and "@cable2"
     arm = special.get(name, ARM)
     arm = arm.with_cables([replace(cable, series_stiffness=2e4) for cable in arm.cables])
     parameters = cdsm.ArmParameters(arm, (f"{name}{at}",))

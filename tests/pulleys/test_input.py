@@ -214,5 +214,7 @@ def test_postures_are_the_same_after_pickling() -> None:
 def test_tolerances_refuse_pulleys_and_sheaths_by_name(element: Any, words: str) -> None:
     arm = arm_of(FINGER, [START, element, END])
     pose = arm.with_springs({"to_palm": 1.0, "to_phalanx": 1.0}).at([0.05, 0.4])
-    with pytest.raises(cdsm.InvalidInput, match=f"cable1.*{words}, and tolerances"):
-        cdsm.uncertainty(pose, [5.0], cdsm.Tolerances(rigidity=0.05), direction="z")
+    with pytest.raises(cdsm.InvalidInput, match=f"site: .*cable1.*{words}, and .*pulley_radius"):
+        cdsm.uncertainty(pose, [5.0], cdsm.Tolerances(site=1e-4), direction="y")
+    budget = cdsm.uncertainty(pose, [5.0], cdsm.Tolerances(rigidity=0.05), direction="y")
+    assert budget.contributions.keys() == {"rigidity"}
