@@ -262,7 +262,15 @@ class LoadHistory(Result, Plotted):
     def to_dict(self) -> dict[str, object]:
         """Return all numbers in SI for JSON, units in the keys; ``loads`` are those on links."""
         loads = [hung.to_dict() for hung in self.on_links]
-        return merged(super().to_dict(), prepare_json({"loads": loads} if loads else {}))
+        numbers = super().to_dict()
+        del numbers["motors_m_or_N"]  # each command has its own unit
+        more: dict[str, object] = {"loads": loads} if loads else {}
+        for cable, column in zip(self.arm.cables, self.motors.T, strict=True):
+            commands: Any = more.setdefault(
+                f"motors_{'m' if cable.control == 'position' else 'N'}", {}
+            )
+            commands[cable.name] = column
+        return merged(numbers, prepare_json(more))
 
     def _labels(self) -> dict[str, Sequence[object]]:
         return {**super()._labels(), "hole": self.holes, "segment": self.segment_names}

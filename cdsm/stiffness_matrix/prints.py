@@ -14,7 +14,15 @@ from cdsm.applied import texts
 from cdsm.errors import SingularStiffness
 from cdsm.quantities import display_for
 from cdsm.stiffness_matrix.verdict import least_joint_stiffness
-from cdsm.support.format import MODEL, coordinates, key, largest_finite, span, without_rounding
+from cdsm.support.format import (
+    MODEL,
+    JointUnits,
+    coordinates,
+    largest_finite,
+    merged,
+    span,
+    without_rounding,
+)
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
@@ -41,8 +49,14 @@ def readings(K: Stiffness) -> dict[str, object]:
 
 def _further_terms(K: Stiffness) -> dict[str, object]:
     """Return the terms of K_θ that only this arm has."""
-    unit = K.posture.arm.stiffness_unit()
-    return {key(term.name, unit): K.terms[term.name] for term in K.posture.arm.definition.terms}
+    arm = K.posture.arm
+    units = JointUnits(arm.slides)
+    dims = ("joint", "joint_column")
+    unit = arm.stiffness_unit()
+    names = [term.name for term in arm.definition.terms]
+    return merged(
+        *(units.keyed(name, unit, dims, K.terms[name], arm.joint_names) for name in names)
+    )
 
 
 def _existing(read: Callable[[], object]) -> object:

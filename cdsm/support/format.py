@@ -152,6 +152,37 @@ class JointUnits(NamedTuple):
             column[name] = q[..., i].tolist()  # type: ignore[index]
         return numbers
 
+    def keyed(
+        self, name: str, unit: str, dims: Sequence[str], value: Any, joints: Sequence[str]
+    ) -> dict[str, object]:
+        """Return a number for JSON, one key for each unit that its entries have.
+
+        ``unit`` is that of the whole, such as ``"N m or N"`` of an arm whose joints turn and slide.
+        Entries of joints are then by their names. Any other number counts 1 m as 1 rad.
+        """
+        turning, _, sliding = unit.partition(" or ")
+        if not sliding or np.size(value) == 0:
+            return {key(name, unit): value}
+        if "joint" not in dims:
+            return {f"{key(name, turning)}_1m_as_1rad": value}
+        entries: dict[str, object] = {}
+        array = np.moveaxis(np.asarray(value), tuple(dims).index("joint"), 0)
+        rows = dict(zip(joints, array, strict=True))
+        if "joint_column" in dims:  # a force per rad, and a torque per m, are N
+            for i, row in enumerate(rows):
+                for j, column in enumerate(rows):
+                    slides = int(self.slides[i]) + int(self.slides[j])
+                    entry = entries.setdefault(key(name, (turning, "N", sliding)[slides]), {})
+                    entry.setdefault(row, {})[column] = array[i, j]  # type: ignore[attr-defined]
+            return entries
+        for slides, own in ((False, turning), (True, sliding)):
+            entries[key(name, own)] = {
+                joint: row
+                for (joint, row), slide in zip(rows.items(), self.slides, strict=True)
+                if slide == slides
+            }
+        return entries
+
     def of(self, unit: str) -> str:
         """Return the SI unit of a quantity, whose ``unit`` may depend on the joints."""
         return self.joined(*UNITS_OF_JOINTS[unit]) if unit in UNITS_OF_JOINTS else unit

@@ -59,11 +59,17 @@ def progress_bar(
         )
         task = bar.add_task(description, total=total)
         begun = monotonic()
+        done = 0
 
         def advance(count: int) -> None:
+            nonlocal done
             if monotonic() - begun >= DELAY:
                 bar.start()
-            bar.advance(task, count)
+            if done:
+                bar.advance(task, count)
+            else:  # the first item compiles and starts: the time left is that of the others
+                bar.reset(task, completed=count)
+            done += count
 
         try:
             yield advance

@@ -143,8 +143,11 @@ class Result(ReadOnlyState):
             numbers = JointUnits(pose.arm.slides).to_dict(pose.arm.joint_names, pose.q)
         for name, value, unit_name, dims in self._quantities():
             named = bool(dims) and {*dims} <= _NAMED & labels.keys()
-            entry = _by_name(value, dims, labels) if named else value
-            numbers = merged(numbers, {key(name, unit_name): entry})
+            entries = {key(name, unit_name): _by_name(value, dims, labels) if named else value}
+            if self._arm and " or " in unit_name and unit_name in self._units().values():
+                units = JointUnits(self._arm.slides)
+                entries = units.keyed(name, unit_name, dims, value, self._arm.joint_names)
+            numbers = merged(numbers, entries)
         return prepare_json(numbers)
 
     def to_xarray(self) -> xarray.Dataset:

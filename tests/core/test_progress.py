@@ -3,6 +3,7 @@
 import io
 import sys
 from collections.abc import Iterable
+from typing import Any
 
 import pytest
 
@@ -46,3 +47,26 @@ def test_a_bar_inside_another_is_hidden(monkeypatch: pytest.MonkeyPatch) -> None
     text = shown(monkeypatch, nested(), 0.0)
     assert "outer" in text
     assert "inner" not in text
+
+
+def test_the_time_left_does_not_count_the_first_item(monkeypatch: pytest.MonkeyPatch) -> None:
+    from rich.progress import Progress
+
+    clock = 0.0
+    left = list[float | None]()
+
+    def started(bar: Progress, *columns: Any, **options: Any) -> None:
+        made(bar, *columns, get_time=lambda: clock, **options)
+        tasks.append(bar)
+
+    tasks = list[Progress]()
+    made = Progress.__init__
+    monkeypatch.setattr(Progress, "__init__", started)
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with progress.progress_bar("designs", 10) as advance:
+        for seconds in (100.0, 1.0, 1.0, 1.0):
+            clock += seconds
+            advance(1)
+            left.append(tasks[0].tasks[0].time_remaining)
+    assert left[0] is None
+    assert left[-1] == pytest.approx(6.0)

@@ -1,12 +1,15 @@
 """Results: what their ``repr`` computes, and that no number of an export overwrites another."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
+import numpy as np
 import pytest
 
 import cdsm
 from cdsm.errors import SingularStiffness
 from cdsm.support.result import Result, quantity, unit
+from tests.support import foreign
 from tests.support.arms import mixed_arm, random_posture
 
 
@@ -56,3 +59,23 @@ def test_json_of_a_report_keeps_the_residual_of_each_joint():
     numbers = report.to_dict()
     assert numbers["residual_Nm"] == K.to_dict()["residual_Nm"]
     assert numbers["largest_residual_Nm"] == report.largest_residual
+
+
+def test_json_has_one_key_for_each_unit() -> None:
+    pose = foreign.crab().at(foreign.POSTURE)
+    K = cdsm.stiffness(pose, foreign.TENSION)
+    numbers: Any = K.to_dict()
+    assert not [name for name in numbers if "_or_" in name]
+    names = pose.arm.joint_names
+    slides = dict(zip(names, pose.arm.slides.tolist(), strict=True))
+    assert numbers["margin_Nm_per_rad_1m_as_1rad"] == K.margin
+    for own, kind in (("Nm_per_rad", 0), ("N", 1), ("N_per_m", 2)):
+        for row, entries in numbers[f"joint_stiffness_{own}"].items():
+            for column, value in entries.items():
+                assert slides[row] + slides[column] == kind
+                assert value == K.joint[names.index(row), names.index(column)]
+    assert numbers["residual_N"].keys() == {name for name in names if slides[name]}
+    assert numbers["residual_Nm"].keys() == {name for name in names if not slides[name]}
+    history: Any = cdsm.load_cycle(pose, foreign.TENSION, np.zeros((1, 6))).to_dict()
+    assert not [name for name in history if "_or_" in name]
+    assert history["angles_m"].keys() == numbers["residual_N"].keys()
