@@ -48,6 +48,7 @@ _HEAD: Final = "9.5em"
 """Height of the text above all tabs, so that sliders do not move while they are dragged."""
 
 _NEAR = 3.0  # a bar reaches to the upper bound if this is below so many times the largest tension
+_WIDEST = 9.0  # of a name beside a bar [em]; a longer one takes two lines
 _AT_BOUND = 1e-6  # distance from a bound at which a tension is marked, over the largest tension
 _MARK: Final = DARK[VERMILLION]
 
@@ -111,23 +112,22 @@ def tensions_text(shown: Shown) -> str:
     ends = [largest, *low[np.isfinite(low)], *high[high <= _NEAR * largest]]
     top = 1.05 * max(ends) or 1.0
     slack = () if shown.rest is None else shown.rest.slack
+    names = shown.posture.arm.cables.names
+    wide = min(0.62 * max(map(len, names)) + 0.6, _WIDEST)
+    near = _AT_BOUND * largest
     rows = []
-    for i, name in enumerate(shown.posture.arm.cables.names):
-        near = _AT_BOUND * largest
+    for i, name in enumerate(names):
         mark = "slack" if name in slack else ""
         mark = mark or ("min" if low[i] > 0.0 and F[i] <= low[i] + near else "")
         mark = mark or ("max" if F[i] >= high[i] - near else "")
-        ticks = [_bar(bound / top, f"bound {name}") for bound in (low[i], high[i]) if bound <= top]
-        color = "rgb({}, {}, {})".format(*shown.cable_colors[i])
-        length = f"width:{100.0 * F[i] / top:.2f}%"
-        filled = f'<i style="position:absolute;inset:0 auto 0 0;{length};background:{color}"></i>'
+        ticks = [bound / top for bound in (low[i], high[i]) if bound <= top]
+        bar = _bar(F[i] / top, shown.cable_colors[i], ticks)
         shade = f"color:{_MARK}" if mark else ""
+        look = f"width:7.2em;text-align:right;white-space:nowrap;{shade}"
         rows.append(
-            f'<div class="tension" style="display:flex;align-items:center;height:1.45em">'
-            f'<span style="width:6em;overflow:hidden">{html.escape(name)}</span><span '
-            f'style="flex:1;position:relative;height:0.8em;background:#eee">{filled}'
-            f'{"".join(ticks)}</span><span style="width:7.2em;text-align:right;'
-            f'white-space:nowrap;{shade}">{F[i]:.4g} N {mark}</span></div>'
+            '<div class="tension" style="display:flex;align-items:center;min-height:1.45em">'
+            f'<span style="width:{wide:.1f}em;overflow-wrap:anywhere;line-height:1">'
+            f'{html.escape(name)}</span>{bar}<span style="{look}">{F[i]:.4g} N {mark}</span></div>'
         )
     bounds = [f"from {span(low)}" * bool(low.any())]
     bounds.append(f"to {span(high)}" * bool(np.isfinite(high).all()))
@@ -265,9 +265,13 @@ def _swatch(color: Color) -> str:
     return f'<span style="background:rgb{color};border-radius:0.2em">&emsp;</span>'
 
 
-def _bar(part: float, title: str) -> str:
-    look = f"position:absolute;left:{100.0 * part:.2f}%;top:-1px;bottom:-1px;width:2px"
-    return f'<i title="{html.escape(title)}" style="{look};background:{_MARK}"></i>'
+def _bar(part: float, color: Color, ticks: Iterable[float]) -> str:
+    """Return a bar that fills a part of the width, with marks at other parts."""
+    style = f"inset:0 auto 0 0;width:{100.0 * part:.2f}%;background:rgb{color}"
+    marks = [f"inset:-1px auto -1px {100.0 * at:.2f}%;width:2px;background:{_MARK}" for at in ticks]
+    pieces = "".join(f'<i style="position:absolute;{look}"></i>' for look in (style, *marks))
+    look = "flex:1;position:relative;height:0.8em;background:#eee"
+    return f'<span style="{look}">{pieces}</span>'
 
 
 def _swatch_line() -> str:

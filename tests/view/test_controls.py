@@ -171,7 +171,7 @@ def test_bars_have_the_lengths_and_bounds_of_the_tensions() -> None:
     top = 0.0
     for name, value, row, color in zip(F.keys(), F.values, rows, shown.cable_colors, strict=True):
         (width,) = re.findall(r"width:([\d.]+)%", row)
-        (bound,) = re.findall(r"left:([\d.]+)%", row)  # the upper one is far beyond the bars
+        (bound,) = re.findall(r"-1px ([\d.]+)%", row)  # the upper one is far beyond the bars
         assert float(width) / value == pytest.approx(float(bound) / STABLE, rel=2e-3)
         top = top or 100.0 * value / float(width)
         assert top == pytest.approx(1.05 * F.values.max(), rel=1e-3)
@@ -182,7 +182,7 @@ def test_bars_have_the_lengths_and_bounds_of_the_tensions() -> None:
     assert "from 20 to 200 N" in re.sub("<[^>]*>", "", tensions_text(shown))
     high = show(arm, setting(arm, 60.0))
     assert high.tension is not None
-    marks = re.findall(r"left:([\d.]+)%", tensions_text(high))
+    marks = re.findall(r"-1px ([\d.]+)%", tensions_text(high))
     assert len(marks) == 2 * len(F)  # now both bounds are in the picture
     assert float(marks[1]) / float(marks[0]) == pytest.approx(200.0 / 60.0, rel=1e-3)
     assert tensions_text(pulled(0.004, -0.006, 0.0)).count("slack</span>") == 1
