@@ -38,6 +38,7 @@ from cdsm.errors import InvalidInput as InvalidInput
 from cdsm.errors import SingularStiffness as SingularStiffness
 from cdsm.errors import UnreachableStiffness as UnreachableStiffness
 from cdsm.estimation import estimate_load as estimate_load
+from cdsm.estimation import estimate_posture as estimate_posture
 from cdsm.estimation import estimate_tensions as estimate_tensions
 from cdsm.friction.stick import breakaway as breakaway
 from cdsm.friction.stick import rest_band as rest_band

@@ -33,7 +33,7 @@ _PART = 0.01  # of a hidden combination, below which a component is told if noth
 _ROUNDING = 1e-9  # the same with exact angles [rad or m]
 
 
-class _Readings(NamedTuple):
+class CheckedReadings(NamedTuple):
     """What was read, and what is known besides."""
 
     pose: Posture
@@ -100,7 +100,7 @@ def estimate_load(
         >>> print(found.loads.round(6), found.std.round(2))
         [ 1. -2.  3.] [0.95 0.37 0.37]
     """
-    readings = _checked(pose, motor_tensions, tension_std, angle_std, sliding, wrench)
+    readings = checked_readings(pose, motor_tensions, tension_std, angle_std, sliding, wrench)
     components = components_of(pose.arm, links, points)
     names = components.names
     equations = int(readings.rows.sum())
@@ -165,7 +165,7 @@ def estimate_tensions(
         >>> print(f"{F[-1]:.1f}, {found.segment_low[-1]:.1f} to {found.segment_high[-1]:.1f} N")
         50.8, 48.0 to 53.7 N
     """
-    readings = _checked(pose, motor_tensions, tension_std, angle_std, sliding, wrench)
+    readings = checked_readings(pose, motor_tensions, tension_std, angle_std, sliding, wrench)
     holes, balance = _solved(readings, Components((), ()), 0.0 * readings.sliding)
     return TensionEstimate(**_tensions(readings, holes, balance))
 
@@ -188,7 +188,7 @@ def tip_force(
     """
     rows = _off_stops(pose, instruments.angle)
     none = np.zeros(exponents.size)
-    readings = _Readings(
+    readings = CheckedReadings(
         pose, motor_tension, motor_tension, instruments, False, np.zeros(6), none, rows
     )
     components = components_of(pose.arm, None, None)
@@ -198,14 +198,15 @@ def tip_force(
     return TipForce(balance.loads, std, band)
 
 
-def _checked(
+def checked_readings(
     pose: Posture,
     motor_tensions: ArrayLike,
     tension_std: ArrayLike | None,
     angle_std: ArrayLike,
     sliding: SlidingLike | None,
     wrench: LoadsLike,
-) -> _Readings:
+) -> CheckedReadings:
+    """Check what was read; InvalidInput names what is wrong."""
     arm = instance("pose", pose, Posture).arm
     cables = arm.cables.names
     read = vector(
@@ -230,7 +231,7 @@ def _checked(
     rows = _off_stops(pose, angle)
     if not rows.any():
         raise InvalidInput("pose", "all joints are at their stops, whose torques are unknown.")
-    return _Readings(
+    return CheckedReadings(
         pose=pose,
         motor_tension=np.maximum(read, 0.0),
         read=read,
@@ -270,13 +271,13 @@ def _off_stops(pose: Posture, angle_std: Array) -> NDArray[np.bool_]:
     return np.asarray((pose.q > arm.lower + near) & (pose.q < arm.upper - near))
 
 
-def _stopped(readings: _Readings) -> tuple[str, ...]:
+def _stopped(readings: CheckedReadings) -> tuple[str, ...]:
     names = readings.pose.arm.joint_names
     return tuple(names[i] for i in np.flatnonzero(~readings.rows))
 
 
 def _solved(
-    readings: _Readings, components: Components, followed: Array
+    readings: CheckedReadings, components: Components, followed: Array
 ) -> tuple[Holes, LoadBalance]:
     taut = readings.motor_tension > 0.0
     holes = holes_of(readings.pose, followed, readings.sliding, taut)
@@ -312,7 +313,7 @@ def _determination(names: tuple[str, ...], scale: Array, balance: LoadBalance) -
     return Determination(names, frozen(seen), frozen(100.0 * scale))
 
 
-def _tensions(readings: _Readings, holes: Holes, balance: LoadBalance) -> dict[str, Any]:
+def _tensions(readings: CheckedReadings, holes: Holes, balance: LoadBalance) -> dict[str, Any]:
     """Return the fields of a :class:`TensionEstimate`."""
     pose = readings.pose
     behind = behind_holes(pose)

@@ -3,14 +3,17 @@
 The sensors are load cells of ±0.5 N and encoders of ±0.1°; the cables have 40 N or more.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
 import cdsm
+from tests.pulleys.test_friction import _rough_finger
+from tests.support.arms import random_arm, readme_geometry
 from tests.support.readings import ANGLE_STD, TENSION_STD, Reading, readings
+from tests.support.rough import rough
 
 STD = {"tension_std": TENSION_STD, "angle_std": ANGLE_STD}
 
@@ -105,3 +108,50 @@ def test_wrench_with_friction() -> None:
     print(found)
     assert found.band >= 0.98
     assert found.combined >= 0.98
+
+
+def rough_arms() -> dict[str, tuple[cdsm.Manipulator, dict[str, Any], float]]:
+    """Arms with much friction, what is sought on each, and the size of their loads [N]."""
+    law = cdsm.LinearElasticity(2e4)
+    coupled = readme_geometry(coupled=True, friction=0.15, joint_stiffness=0.8)
+    return {
+        "much friction": (readme_geometry_arm(0.3), {"tool0": "force"}, 4.0),
+        "hinged": (rough(random_arm(4, 5, "hinged"), 0.15), {"tool0": "force"}, 4.0),
+        "pulleys": (_rough_finger(0.2), {"l3": "force"}, 1.0),
+        "coupled": (cdsm.Manipulator(coupled, law), {"tool0": ["fy", "fz"]}, 2.0),
+    }
+
+
+def readme_geometry_arm(friction: float) -> cdsm.Manipulator:
+    return cdsm.Manipulator(readme_geometry(friction=friction), cdsm.presets.STRAND_1X19)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["much friction", "hinged", "pulleys", "coupled"])
+def test_the_band_holds_on_other_arms(name: str) -> None:
+    arm, links, size = rough_arms()[name]
+    rng = np.random.default_rng(3)
+    std, angle = 0.1 * size, np.deg2rad(0.05)
+    inside: list[bool] = []
+    while len(inside) < 40:
+        q = rng.uniform(-0.2, 0.2, arm.nv)
+        loads = rng.normal(size=(2, 6)) * [0.0, size, size, 0.0, 0.0, 0.0]
+        loads[:, 0] = size * rng.normal(size=2) * (name != "coupled")
+        try:
+            pose = arm.at(q)
+            F = cdsm.distribute_tension(pose, minimum=10.0 * size).values
+            moves = 1e-4 * rng.normal(size=F.size)
+            history = cdsm.load_cycle(pose, F, loads, motors=[moves, moves])
+        except cdsm.CdsmError:
+            continue
+        T = history.segment_tensions[-1]
+        if history.snaps.any() or T.min() < 0.5 * size:
+            continue
+        read = T[pose.segments.chains.start[:-1]] + std * rng.normal(size=F.size)
+        there = arm.at(history.angles[-1] + angle * rng.normal(size=arm.nv), check_limits=False)
+        found = cdsm.estimate_load(there, read, links, tension_std=std, angle_std=angle)
+        rows = found.components.rows[0]
+        off = abs(found.loads - loads[-1][list(rows)])[found.told]
+        reach = (found.band + 1.96 * found.std)[found.told]
+        inside.append(bool((off <= reach).all()))
+    assert np.mean(inside) >= 0.95
