@@ -273,11 +273,15 @@ def tip_part(applied: Applied) -> Array:
 
 def tip_only(applied: Applied) -> Array:
     """Return the wrench W (6,) at the tip; InvalidInput if a load acts elsewhere."""
-    others = as_loads(applied).on_links
-    if others:
-        names = listed([load.at.link for load in others])
-        raise InvalidInput("wrench", f"loads act on {names}; only one at the tip is known here.")
+    refuse_links(applied, "wrench", "only one at the tip is known here.")
     return tip_part(applied)
+
+
+def refuse_links(applied: Applied, name: str, why: str) -> None:
+    """Raise InvalidInput if a load acts elsewhere than at the tip; ``why`` comes last."""
+    if others := as_loads(applied).on_links:
+        links = listed([load.at.link for load in others])
+        raise InvalidInput(name, f"loads act on {links}; {why}")
 
 
 class Loaded:
@@ -330,6 +334,11 @@ def texts(arm: ComputedArm, applied: Applied) -> list[str]:
         whose = "load of the arm" if own else "load"
         lines.append(f"{whose} on {at.link}, {where}: {', '.join(parts) or 'none'}")
     return lines
+
+
+def own_loads(arm: ComputedArm) -> list[str]:
+    """Return a line for each load that belongs to an arm, with its place."""
+    return texts(arm, np.zeros(6))
 
 
 def without_cables(

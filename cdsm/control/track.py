@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import qr
 
-from cdsm.applied import required_torque
+from cdsm.applied import refuse_links, required_torque
 from cdsm.control.laws import (
     LAWS,
     ControlInput,
@@ -118,6 +118,9 @@ def track(
     """
     arm = instance("plan", plan, PathPlan).arm
     refuse_shared(arm.motors, "plan")
+    for K in plan.stiffness:
+        why = "controllers know loads at the tip only. A load that stays belongs to the arm: "
+        refuse_links(K.applied, "plan", f"{why}arm.with_loads(...), [[loads]] in ARM.toml.")
     if not plan.complete:
         first = plan.infeasible[0]
         lacking = f"{len(plan.infeasible)} of {len(plan.target)}"

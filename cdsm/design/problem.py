@@ -18,6 +18,7 @@ from cdsm.definition import refuse_terms
 from cdsm.design.goals import Constraint, Measure, Objective
 from cdsm.design.variables import WHOLE, Value, Variable, changed
 from cdsm.errors import InvalidInput, listed
+from cdsm.loads import has_loads
 from cdsm.manipulator import Manipulator
 from cdsm.parameters import PARAMETERS
 from cdsm.support.format import plural
@@ -93,6 +94,9 @@ class DesignProblem(ReadOnlyState):
         if not variables or not objectives:
             raise InvalidInput("variables", "give one variable and one objective or more.")
         _require_compatible(variables, self.arm)
+        if has_loads(self.loads):
+            problem = "designs take wrenches (n, 6) at the tip; loads on links that stay belong to "
+            raise InvalidInput("loads", f"{problem}the arm: with_loads, [[loads]] in its ARM.toml.")
         loads = np.atleast_2d(number_array("loads", self.loads, "wrench"))
         if loads.ndim != 2 or loads.shape[1] != 6 or not len(loads):
             raise InvalidInput(

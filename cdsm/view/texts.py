@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from cdsm.applied import own_loads
 from cdsm.cable import wires_text
 from cdsm.errors import SingularStiffness
 from cdsm.manipulator import Manipulator
@@ -81,6 +82,8 @@ def said_numbers(shown: Shown) -> list[str]:
 def answer_text(shown: Shown, scene: Scene) -> str:
     """Write the table of numbers, and the legend of the scene."""
     parts = [_table(_numbers(shown))]
+    if shown.posture is not None and (own := own_loads(shown.posture.arm)):
+        parts.append(lines("\n".join(own)))
     if shown.stiffness is not None:
         parts.append(lines(model_of(shown.stiffness)))
     legend = [f"grid: {MM * scene.cell:g} mm"]

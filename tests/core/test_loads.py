@@ -411,6 +411,17 @@ def test_what_takes_only_a_wrench_at_the_tip_says_so() -> None:
     held = cdsm.payload(pose, "-z", 10.0, 200.0, wrench=hung)
     with pytest.raises(cdsm.InvalidInput, match="loads act on link2"):
         _ = held.wrench
+    plan = cdsm.plan_path(pose.arm, "z", 4e3, 20.0, 600.0, hung, angles=[Q, 0.9 * Q])
+    with pytest.raises(cdsm.InvalidInput, match="plan: loads act on link2; controllers know"):
+        cdsm.track(plan)
+    with pytest.raises(cdsm.InvalidInput, match=r"loads: designs take wrenches .* belong to the a"):
+        cdsm.DesignProblem(
+            arm=pose.arm,
+            variables=[cdsm.Variable("disk_offset", 0.01, 0.02)],
+            objectives=[cdsm.Objective("mass")],
+            postures=[Q],
+            loads=hung,  # type: ignore[arg-type]
+        )
     with pytest.raises(cdsm.InvalidInput, match="point: is a point of a link"):
         cdsm.stiffness(pose, tension).along("z", point=(0.0, 0.0, 0.0))
 

@@ -86,6 +86,15 @@ def test_a_stable_arm_is_shown_with_the_numbers_of_the_api() -> None:
     assert "joint1_1" in beyond.problem
 
 
+def test_the_page_tells_loads_that_belong_to_the_arm() -> None:
+    arm = soft_arm().with_loads(cdsm.Load("link2", (0.0, 0.0, -0.3)))
+    shown = show(arm, setting(arm))
+    K = cdsm.stiffness(arm.at(np.deg2rad(DEGREES)), shown.tension or [])
+    assert numbers(shown)["stiffness along x, y, z"] == along(K)
+    assert "load of the arm on link2, (0, 0, 0) mm in its frame: (0, 0, -0.3) N" in text(shown)
+    assert "load of the arm" not in text(show(soft_arm(), setting(arm)))
+
+
 @pytest.mark.parametrize(
     ("minimum", "force", "status"),
     [
