@@ -282,6 +282,7 @@ def template(
         values |= {f"{key}_degrees": f"{math.degrees(x):.4g}" for key, x in sizes.items()}
         values["kind"] = kind if len(sections) == 1 else f"sections.{kind}"
         values["start"] = "end of the section before" if i else "base frame"
+        values["centre"] = "contact" if kind == "rolling" else "joint centre"
         values["limit_reason"] = "disks touch there, as by default"
         if kind == "universal" and sizes["joint_limit"] == HELD:
             values["limit_reason"] = "cables often cannot hold more; default: disks touch"

@@ -15,11 +15,12 @@ from cdsm.cli import options
 from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse
 
-JointType = Literal["universal", "hinged"]
+JointType = Literal["universal", "hinged", "rolling"]
 
 _JOINTS = (
     "Number of joints, default 4; several: of sections, each a quarter narrower than the last."
 )
+_TYPE = "Joints: universal; hinges 90 degrees apart; or links whose round ends roll on each other."
 _WIRE = "Wire of all cables: a name, a rope such as 7x7-0.8mm (1x7, 1x19, 7x7, 7x19, uhmwpe), a "
 _WIRE += "constant EA in N, or a file of `cdsm fit`. Default: "
 _WIRE += "1x19-1.2mm; with --from, that of the cables."
@@ -30,9 +31,7 @@ _INERTIA = "Accept moments of inertia that no body can have."
 def new(
     arm: Annotated[Path, file_opt("File to write.", "ARM.toml", declare=typer.Argument)],
     joints: Annotated[str | None, opt(_JOINTS, "N[,N,...]")] = None,
-    kind: Annotated[
-        JointType, opt("Joints: universal, or hinges 90 degrees apart.", None, "--type")
-    ] = "universal",
+    kind: Annotated[JointType, opt(_TYPE, None, "--type")] = "universal",
     wire: Annotated[str | None, opt(_WIRE, "NAME|EA|WIRE.toml")] = None,
     source: Annotated[Path | None, opt(_FROM, "ROBOT.urdf|FOLDER", "--from")] = None,
     cables: Annotated[Path | None, opt("Cables of the robot.", "CABLES.toml")] = None,
@@ -137,7 +136,7 @@ def _serpentine(
     """Build an arm of sections with these numbers of joints; return it with the sizes of each."""
     from cdsm.arm_file.arm import HELD
 
-    hinged = kind == "hinged"
+    hinged = kind != "universal"
     parts = []
     for i, count in enumerate(counts):
         each = 2 if hinged else 3
@@ -145,6 +144,10 @@ def _serpentine(
         sizes |= {"cables_per_joint": each, "link_length": 0.06, "base_length": 0.0 if i else 0.03}
         radius = round(0.025 * 0.75**i, 6)
         sizes |= {"disk_offset": 0.012, "hole_radius": radius, "link_mass": 0.12, "lead": 0.3}
+        if kind == "rolling":  # holes on the rim, 53 degrees from the line of centres
+            round_end = round(0.025 * 0.75**i, 6)
+            sizes |= {"radius": round_end, "hole_radius": round(0.8 * round_end, 6)}
+            sizes |= {"disk_offset": round(0.4 * round_end, 6)}
         if hinged:  # 10 degrees, or less: holes of one plane must not reach those of the next
             sizes["spread"] = min(math.radians(10.0), math.tau / (count * each))
         if i:  # between the holes of all sections, wherever those are

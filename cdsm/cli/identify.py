@@ -135,7 +135,8 @@ _LOOPS += "[mm] or tension [N] per cable; as examples/data/TIPS.csv, PULLS.csv."
 _FREE = "Parameter to find; repeat it: friction; rigidity (factor on EA); spring [N/mm] in series; "
 _FREE += "lead, hole_radius, disk_offset, link_length [mm]; link_mass [g]; joint_stiffness, "
 _FREE += (
-    "bending_stiffness [N m/rad, N m²]; of pulls also slack [mm], gain. Default bounds: half to "
+    "bending_stiffness [N m/rad, N m²]; exponent of a spring's law; pulley_radius [mm], added; of "
+    "pulls also slack [mm], gain. Default bounds: half to "
 )
 _FREE += "twice the arm's own value; friction 0 to 1."
 _START = (

@@ -51,3 +51,27 @@ def test_every_key_behind_a_hash_may_be_used(name: str, tmp_path: Path) -> None:
     used = cdsm.Manipulator.read(path)
     assert used.cables[0].minimum == 20.0
     assert len(used.tolerances.given) == 8
+
+
+@pytest.mark.parametrize("joints", ["4", "3,3"])
+@pytest.mark.filterwarnings("error::cdsm.CdsmWarning")
+def test_new_writes_arms_whose_links_roll(joints: str, tmp_path: Path) -> None:
+    path = tmp_path / "roll.toml"
+    told = call("new", path, "--type", "rolling", "--joints", joints)
+    assert told.exit_code == 0, told.output
+    text = path.read_text(encoding="utf-8")
+    assert max(map(len, text.splitlines())) <= 110
+    assert "from each contact to the disks before and after it" in text
+    arm = cdsm.Manipulator.read(path)
+    ends = [joint.rolls for joint in arm.geometry.joints]
+    assert ends == [(0.025, 0.025)] * 4 if joints == "4" else ends[3] == (0.01875, 0.01875)
+    for angles in (0.0, 5.0):
+        pose = arm.at(np.full(arm.nv, np.deg2rad(angles)))
+        assert cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10.0)).is_stable
+    assert call("stiffness", path, "--angles", 5, "--check").exit_code == 0
+    # holes are on the rims: a pair straightens the arm
+    (joint, *_) = arm.geometry.joints
+    assert joint.rolls is not None
+    radius = joint.rolls[0]
+    hole = (joint.hole_radius or arm.geometry.hole_radius) / radius
+    assert joint.disk_offset == pytest.approx(radius * (1.0 - np.sqrt(1.0 - hole**2)))
