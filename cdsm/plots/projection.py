@@ -24,6 +24,7 @@ _TRIAD = 0.14  # length of the drawn base axes, over the size of what is drawn
 _LAYERS = 3.0  # zorder of what is halfway between front and back
 _DEPTHS = 20.0  # depth that is one zorder, over the size of what is drawn
 _TOWARDS_EYE = 0.1  # an axis shorter than this part of its length looks like a point
+_PARTS: Final = np.linspace(0.0, 1.0, 12)[1:-1]  # of a line, whose points the base axes avoid
 _LOWEST, _HIGHEST = 1.2, 3.6  # of a figure of one column [inch]
 
 
@@ -63,8 +64,10 @@ class Drawing:
         return flat
 
     def include(self, flat: Array) -> None:
-        """Let the picture reach points (…, 2) of the panel."""
-        self._points.append(flat.reshape(-1, 2))
+        """Let the picture reach points (…, 2) of the panel, and the lines from each to the next."""
+        points = flat.reshape(-1, 2)
+        between = points[:-1, None] + _PARTS[:, None] * np.diff(points, axis=0)[:, None]
+        self._points += [points, between.reshape(-1, 2)]
 
     def layer(self, points: Array) -> float:
         """Return the zorder of points (…, 3) [m]: higher in front of others."""

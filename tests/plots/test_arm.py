@@ -89,6 +89,21 @@ def test_base_axes_are_drawn_to_the_scale_that_they_name() -> None:
     np.testing.assert_allclose(named(ax)["z"].xy, artists(ax, "axis:x")["axis:x"].xyann)
 
 
+@pytest.mark.parametrize("bend", [0.0, 0.05, 0.3])
+def test_base_axes_stand_where_no_line_is(bend: float) -> None:
+    pose = short_arm().at(np.full(6, bend))
+    ax = plots.plot_arm(pose, cdsm.distribute_tension(pose, 10.0))
+    require_look(ax)
+    (text,) = (text for words, text in named(ax).items() if words.startswith("axes "))
+    box = text.get_window_extent()
+    for drawn in ax.lines:
+        ends = ax.transData.transform(drawn.get_xydata())
+        parts = np.linspace(0.0, 1.0, 50)[:, None]
+        for start, end in pairwise(ends):
+            points = start + parts * (end - start)
+            assert not any(box.contains(*point) for point in points)
+
+
 def test_names_stand_at_the_ends_of_their_cables_and_colours_at_their_tensions() -> None:
     ax = plots.plot_arm(POSE, PULL, view=FRONT, names=True)
     for name, path in zip(POSE.arm.cables.names, POSE.cable_paths, strict=True):
@@ -153,6 +168,27 @@ def test_load_is_an_arrow_along_the_force() -> None:
     assert end[0] == pytest.approx(start[0])
     assert end[1] < start[1]  # down
     assert "4 N" in [text.get_text() for text in ax.texts]
+
+
+def test_loads_on_links_are_arrows_where_they_act() -> None:
+    pose = short_arm().at(np.full(6, 0.1))
+    hung = [
+        cdsm.Load("link2", force=(0.0, 0.0, -1.5), point=(0.01, 0.0, 0.02)),
+        cdsm.Load("tool0", force=(0.5, 0.0, 0.0)),
+    ]
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10.0, wrench=hung))
+    ax = K.plot(view=FRONT)
+    arrows = artists(ax, "force")
+    assert {*arrows} == {"force", "force:link2"}
+    start, end = arrows["force:link2"]._posA_posB
+    placement = pose.link_pose("link2")
+    place = placement[:3, 3] + placement[:3, :3] @ [0.01, 0.0, 0.02]
+    np.testing.assert_allclose(start, 1e3 * place[[0, 2]], atol=1e-6)
+    assert end[0] == pytest.approx(start[0])
+    assert end[1] < start[1]
+    start, end = arrows["force"]._posA_posB
+    assert end[0] > start[0]
+    assert {"1.5 N", "0.5 N"} <= {*named(ax)}
 
 
 def test_slack_cables_are_dashed_and_an_unstable_arm_is_called_so() -> None:

@@ -15,11 +15,12 @@ import cdsm
 from cdsm import plots, track
 from cdsm.identification import Identification, WeightLoop, identify
 from cdsm.planning.path_plan import PathPlan
+from cdsm.plots.measured import shade_stages
 from cdsm.support.values import Plotted
 from tests.design import test_problem as designs
 from tests.identification import test_experiment as experiment
 from tests.identification import test_search as identified
-from tests.support.pictures import artists, line, require_look, words
+from tests.support.pictures import artists, line, named, require_look, words
 from tests.support.printed import numbers, require_all
 from tests.support.sweeps import short_arm
 from tests.support.tracking import small_path
@@ -115,6 +116,20 @@ def test_fit_of_a_tensile_test_is_drawn_over_it() -> None:
     assert (right.get_xlabel(), right.get_ylabel()) == ("tension [N]", "tangent rigidity EA [kN]")
     require_all([(numbers(words(axs), "wire of {}")[0], fit.test.gauge_length)])
     require_look(axs)
+
+
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_stages_of_a_wire_stand_between_their_ends(along: str) -> None:
+    ax = Figure().subplots()
+    stages = [("pre-tensioning", 10.0, 30.0), ("elastic", 30.0, 90.0)]
+    shade_stages(ax, stages, along)
+    for name, low, high in stages:
+        span = artists(ax, f"stage:{name}")[f"stage:{name}"]
+        start = span.get_x() if along == "x" else span.get_y()
+        size = span.get_width() if along == "x" else span.get_height()
+        assert (start, size) == pytest.approx((low, high - low))
+        place = named(ax)[name].get_position()["xy".index(along)]
+        assert place == pytest.approx((low + high) / 2.0)
 
 
 def test_law_of_a_wire_is_drawn_in_kilonewtons() -> None:
