@@ -343,23 +343,20 @@ class Equilibrium(Result, Loaded):
 
     def to_dict(self) -> dict[str, object]:
         """Return the numbers in SI for JSON; with friction, those of segments and holes too."""
-        if self.path is None:
-            motors = self.pose.arm.motors
-            turns = dict(zip(motors.names, self.motor_turns, strict=True))
-            more: dict[str, object] = self._loads()
-            if motors.yielding is not None:
-                more["motor_yield_rad"] = turns
-            if self.commands is not None:
-                more |= motors.described(self.commands)
-            return merged(super().to_dict(), prepare_json(more))
-        labels = self.path.segment_names
-        followed: dict[str, object] = {
-            **self._loads(),
-            "segment_tension_N": dict(zip(labels, self.path.segment_tensions[-1], strict=True)),
-            "sliding": dict(zip(self.path.holes, self.path.sliding[-1], strict=True)),
-            "snapped": bool(self.path.snaps.any()),
-        }
-        return merged(super().to_dict(), prepare_json(followed))
+        motors = self.pose.arm.motors
+        more: dict[str, object] = self._loads()
+        if motors.yielding is not None:
+            more["motor_yield_rad"] = dict(zip(motors.names, self.motor_turns, strict=True))
+        if self.commands is not None:
+            more |= motors.described(self.commands)
+        if self.path is not None:
+            labels = self.path.segment_names
+            more |= {
+                "segment_tension_N": dict(zip(labels, self.path.segment_tensions[-1], strict=True)),
+                "sliding": dict(zip(self.path.holes, self.path.sliding[-1], strict=True)),
+                "snapped": bool(self.path.snaps.any()),
+            }
+        return merged(super().to_dict(), prepare_json(more))
 
     def _yielded(self) -> list[str]:
         """Return a line that says which motors yield by how far."""

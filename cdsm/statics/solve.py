@@ -213,7 +213,7 @@ def _descend(
         if saddle:
             there = f.attempt(here.x + step)
         else:
-            there, step = _reached(f, here, step)
+            there, step = _reached(f, here, step, far=home is None)
         gain = float(here.value @ step)
         if there and (saddle or 0.0 > 0.5 * gain > (here.value + there.value) @ step):
             here = there
@@ -223,12 +223,13 @@ def _descend(
     return here, False
 
 
-def _reached(f: Balance, here: Point, step: Array) -> tuple[Point | None, Array]:
+def _reached(f: Balance, here: Point, step: Array, *, far: bool) -> tuple[Point | None, Array]:
     """Return the point after a step, and the step: shortened where the arm would swing back.
 
     Where cables begin to stick or to pull, K grows within the step, and f·step has turned positive
     at its end: the next end is where f·step is 0 if it is linear along the step. If this end is far
-    short of it, since K has grown at once, the step ends between both.
+    short of it, since K has grown at once, a search that may go ``far`` ends the step between both.
+    Near a branch of equilibria that must not be left, small steps do.
     """
     there = f.attempt(here.x + step)
     beyond = 0.0  # f·step at a longer step that went too far, per length of this one
@@ -241,7 +242,7 @@ def _reached(f: Balance, here: Point, step: Array) -> tuple[Point | None, Array]
         beyond = end
         step = start / (start - end) * step
         there = f.attempt(here.x + step)
-    if there is not None and beyond:
+    if far and there is not None and beyond:
         return _between(f, here, (there, step), whole)
     return there, step
 

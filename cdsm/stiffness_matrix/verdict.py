@@ -210,7 +210,19 @@ def find_doubts(pose: Posture) -> Iterator[Finding]:
 
 def describe_buckling(K: Stiffness) -> str:
     """Return a sentence about an unstable arm: which joint buckles most, and the margin."""
-    return f"UNSTABLE: the arm buckles, {weakest_joint(K)} most; {_eigenvalue(K)}"
+    sentence = f"UNSTABLE: the arm buckles, {weakest_joint(K)} most; {_eigenvalue(K)}"
+    return f"{sentence}{_if_motors_held(K)}"
+
+
+def _if_motors_held(K: Stiffness) -> str:
+    """Say so if the arm would be stable with rigid motors in place of those that yield."""
+    soft = K.posture.arm.motors.yielding
+    if soft is None:
+        return ""
+    rigid = K.joint + soft.softening(K.posture.length_jacobian, K.cable_stiffness)
+    if least_eigenpair(rigid, K.posture.arm)[0] <= 0.0:
+        return ""
+    return f"; with rigid motors in place of {listed(soft.names)} it would be stable"
 
 
 def weakest_joint(K: Stiffness) -> str:

@@ -204,6 +204,7 @@ def test_friction_follows_rigid_motors_from_the_assembly() -> None:
     rest = cdsm.forward_statics(arm, motors=turn, assembly=assembly)
     assert rest.path is not None
     assert rest.history.startswith("with friction: driven from even tensions in 8 steps; ")
+    assert rest.to_dict()["motor_turn_rad"]["m1"] == 0.1  # type: ignore[index]
     smooth = cdsm.forward_statics(arm, motors=turn, assembly=assembly, friction=False)
     off = abs(rest.pose.q - smooth.pose.q).max()
     assert 1e-4 < off < 0.05

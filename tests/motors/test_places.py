@@ -244,3 +244,14 @@ def test_friction_with_motors_that_yield_is_refused_and_answered_with_rigid_ones
     ):
         with pytest.raises(cdsm.InvalidInput, match=r"m1, m1b.* yields: friction in the holes"):
             call()
+
+
+def test_an_arm_that_falls_since_a_motor_yields_is_told_so() -> None:
+    K = cdsm.stiffness(*pulled(changed(spooled(), {"m1": TORQUE})))
+    assert not K.is_stable
+    assert "with rigid motors in place of m1 it would be stable" in K.warnings[0]
+    assert cdsm.stiffness(*pulled(spooled())).is_stable
+    weak = changed(spooled(elasticity=cdsm.LinearElasticity(300.0)), {"m1": TORQUE})
+    K = cdsm.stiffness(*pulled(weak, 300.0))
+    assert not K.is_stable
+    assert "rigid motors" not in K.warnings[0]
