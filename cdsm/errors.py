@@ -239,7 +239,7 @@ class EquilibriumError(CdsmError, ArithmeticError):
 
     ``residual`` (nv,) [N m] or [N] is the torque left at the last iterate, ``load_factor`` [-] the
     largest fraction of the load in equilibrium, ``joint`` the one with the largest residual or that
-    buckles first.
+    buckles first; ``problem`` is the message without the remedy.
     """
 
     status = Status.NO_EQUILIBRIUM
@@ -254,6 +254,7 @@ class EquilibriumError(CdsmError, ArithmeticError):
     ) -> None:
         usual = "Reduce the load, raise the tensions, or take stiffer cables or springs."
         super().__init__(f"{problem}. {remedy or usual}")
+        self.problem = problem
         self.residual = residual
         self.load_factor = load_factor
         self.joint = joint

@@ -240,7 +240,18 @@ def weigh(
     else:
         more = {}
         link, force = _one_force(weights)
-        result = cdsm.weight_test(pose, start, force, steps=steps or 5, link=link)
+        try:
+            result = cdsm.weight_test(pose, start, force, steps=steps or 5, link=link)
+        except cdsm.EquilibriumError as error:
+            following = None
+            if link == robot.tip_link and K.distribution is not None:
+                following = cdsm.payload(pose, force, minimum, maximum).following
+            if following is None:
+                raise
+            remedy = f"Reduce the load, or let the {following}."
+            raise cdsm.EquilibriumError(
+                error.problem, error.residual, error.load_factor, error.joint, remedy
+            ) from None
         if (bounds := K.distribution) is not None:
             u = force / math.hypot(*force)
             case = pose, u, K.applied, K.tension, bounds.maximum_held

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from cdsm.errors import InvalidInput
 from cdsm.planning.range import StiffnessRange
 from cdsm.plots import style
-from cdsm.plots.style import N_PER_MM
+from cdsm.support.format import stiffness_text, stiffness_unit
 from cdsm.support.validation import instance, scalar
 from cdsm.support.values import Array
 
@@ -32,7 +32,7 @@ _MOST_ROWS = 72  # of more cables every second, third, … row has a name
 
 @style.styled
 def plot_shares(shares: Shares, ax: Axes | None = None, *, title: str | None = None) -> Axes:
-    """Plot the contribution [N/mm] of each cable, gravity, load and springs as bars.
+    """Plot the contribution of each cable, gravity, load and springs as bars [N/mm, or N/m].
 
     The passive part of a cable (its elasticity) and the active one (its tension) stand on each
     other, with the share of both beside them.
@@ -40,26 +40,28 @@ def plot_shares(shares: Shares, ax: Axes | None = None, *, title: str | None = N
     arm = shares.posture.arm
     others = shares.others
     panel, y = _rows(ax, arm.cables.names, others)
-    passive, active = N_PER_MM * shares.passive, N_PER_MM * shares.active
+    unit, size = stiffness_unit(shares.total, shares.passive, shares.active)
+    passive = shares.passive / size
+    active = shares.active / size
     cables = y[: len(passive)]
     # bars of one sign stand on each other, so that none hides another
     left = np.where(passive * active > 0.0, passive, 0.0)
     panel.barh(cables, passive, _BAR, color=style.BLUE, label="passive: its elasticity")
     panel.barh(cables, active, _BAR, left=left, color=style.ORANGE, label="active: its tension")
-    rest = N_PER_MM * np.array(list(others.values()))
+    rest = np.array(list(others.values())) / size
     colors = [style.TERM_COLORS.get(name, "0.5") for name in others]
     panel.barh(y[len(passive) :], rest, _BAR, color=colors)
     high = np.append(np.maximum(passive, 0.0) + np.maximum(active, 0.0), np.maximum(rest, 0.0))
     low = np.append(np.minimum(passive, 0.0) + np.minimum(active, 0.0), np.minimum(rest, 0.0))
     width = float(high.max() - low.min()) or 1.0
-    total = N_PER_MM * shares.total
+    total = shares.total / size
     for place, value, end in zip(y, np.append(passive + active, rest), high, strict=True):
         color = style.INK if abs(value) > _LARGE * abs(total) else style.SOFT
         _write(panel, end + 0.012 * width, place, f"{100.0 * value / total:z.1f} %", color)
     panel.axvline(0.0, color="0.3", lw=0.6)
     panel.set_xlim(low.min() - 0.02 * width, high.max() + 0.17 * width)
     direction = style.direction_name(shares.direction)
-    panel.set_xlabel(f"contribution [N/mm] to {total:.4g} N/mm along {direction}")
+    panel.set_xlabel(f"contribution [{unit}] to {total:.4g} {unit} along {direction}")
     # to the left, where names of cables leave room
     panel.legend(loc="upper right", bbox_to_anchor=(1.0, -0.42 / style.height_of(panel)), ncols=2)
     style.set_title(panel, title, f"{arm.name}: what makes it stiff?", shares.is_stable)
@@ -117,9 +119,10 @@ def plot_stiffness_plan(
     else:
         highest = max(highest, _marks(panel, y, attainable))
     panel.set_xlim(0.0, 1.18 * highest)
-    achieved = " and ".join(f"{N_PER_MM * k:.4g}" for k in np.atleast_1d(plan.achieved))
+    unit, size = stiffness_unit(plan.achieved)
+    achieved = " and ".join(f"{k / size:.4g}" for k in np.atleast_1d(plan.achieved))
     misses = "" if plan.reached else f", missed by {100.0 * plan.misfit:.2g} %"
-    question = f"which tensions give {achieved} N/mm?"
+    question = f"which tensions give {achieved} {unit}?"
     style.set_title(panel, title, f"{F.posture.arm.name}: {question}{misses}")
     return panel
 
@@ -216,7 +219,7 @@ def _marks(panel: Axes, y: Array, attainable: StiffnessRange) -> float:
     )
     for name, value, tension, marker, color in cases:
         look: dict[str, Any] = {"color": color, "mfc": "white", "mew": 1.0, "ms": 4.5, "zorder": 4}
-        words = f"{name}: {N_PER_MM * value:.4g} N/mm"
+        words = f"{name}: {stiffness_text(value)}"
         panel.plot(tension.values, y, marker, ls="", label=words, gid=name, **look)
     anchor = (0.0, -0.42 / style.height_of(panel))
     panel.legend(loc="upper left", bbox_to_anchor=anchor, ncols=2)

@@ -26,7 +26,7 @@ from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
 from cdsm.stiffness_matrix.prints import softer_side
 from cdsm.stiffness_matrix.verdict import describe_buckling
-from cdsm.support.format import one_unit, plural
+from cdsm.support.format import one_unit, plural, stiffness_text, stiffness_unit
 from cdsm.support.status import check_sweep
 from cdsm.support.validation import (
     NO_WRENCH,
@@ -87,7 +87,9 @@ def plot_stiffness_over_tension(
     terms: bool = True,
     title: str | None = None,
 ) -> Axes:
-    """Plot the stiffness [N/mm] along a direction over the lower bound of all tensions [N].
+    """Plot the stiffness along a direction over the lower bound of all tensions [N].
+
+    It is in N/mm, of soft arms in N/m.
 
     The terms of K_θ, such as the elasticity of the cables and their tension, are drawn too; they
     add up to the stiffness. A range in which the arm is unstable is hatched. Marks tell from where
@@ -136,6 +138,9 @@ def plot_stiffness_over_tension(
         levels = np.geomspace(max(least, curve[0], 1e-9 * curve[-1]), curve[-1], _LEVELS)
     bounds = np.sort(np.atleast_1d(number_array("levels", levels)))
     x, along, parts = _over_tension(pose, bounds[bounds <= maximum.min()], u, wrench, maximum)
+    unit, size = stiffness_unit(along)
+    along = along / size
+    parts = {term: values / size for term, values in parts.items()}
     panel = style.panel(ax)
     panel.axhline(0.0, color="0.3", lw=0.6)
     name = style.direction_name(u)
@@ -160,7 +165,7 @@ def plot_stiffness_over_tension(
     panel.set_ylim(low - room * (low < 0.0), high + room)
     panel.set_xlim(x[0], x[-1] if x[-1] > x[0] else x[0] + 1.0)
     style.name_lines(panel, float(x[last] if len(x) > 1 else panel.get_xlim()[1]), ends)
-    panel.set(xlabel="least tension of all cables [N]", ylabel=f"stiffness along {name} [N/mm]")
+    panel.set(xlabel="least tension of all cables [N]", ylabel=f"stiffness along {name} [{unit}]")
     if np.isnan(along[last + 1 :]).any():
         bounded = bool(np.isfinite(maximum).any())
         buckles = math.inf if bounded else critical_tension(pose, wrench).minimum
@@ -220,7 +225,7 @@ def at_level(
 def _over_tension(
     pose: Posture, bounds: Array, u: Array, wrench: Applied, maximum: Array
 ) -> tuple[Array, Array, dict[str, Array]]:
-    """Return tensions that held [N], stiffness and its terms [N/mm]; NaN where it is unstable."""
+    """Return tensions that held [N], stiffness and its terms [N/m]; NaN where it is unstable."""
     levels: list[TensionLevel] = []
     error: CdsmError | None = None
     for bound in bounds.tolist():
@@ -228,14 +233,13 @@ def _over_tension(
         error = level.problem or error
         if not levels or level.held > levels[-1].held:
             levels.append(level)
-    along = N_PER_MM * np.array([level.along for level in levels])
+    along = np.array([level.along for level in levels])
     if not np.isfinite(along).any():
         assert error is not None
         raise error
     names = dict.fromkeys(name for level in levels for name in level.terms)
     terms = {
-        name: N_PER_MM * np.array([level.terms.get(name, math.nan) for level in levels])
-        for name in names
+        name: np.array([level.terms.get(name, math.nan) for level in levels]) for name in names
     }
     return np.array([level.held for level in levels]), along, terms
 
@@ -360,7 +364,7 @@ def plot_weight_test(test: WeightTest, ax: Axes | None = None, *, title: str | N
         end = min(force / slope, float(max(abs(moved).max(), abs(smooth).max())))
         line: dict[str, Any] = {"color": "0.55", "lw": 0.9, "ls": "--"}
         panel.plot([0.0, end], [0.0, end * slope], gid="linear", **line)
-        words = f"linear: {slope:.3g} N/mm"
+        words = f"linear: {stiffness_text(test.tangent, digits=3)}"
         look: dict[str, Any] = {"fontsize": 7, "color": style.SOFT, "ha": "right", "va": "bottom"}
         look |= {"xytext": (-4, 1), "textcoords": "offset points"}
         panel.annotate(words, (0.93 * end, 0.93 * end * slope), **look)

@@ -217,7 +217,8 @@ def draw_curve(K: Stiffness, tension: Tension, u: Array) -> Axes:
     if high > low:  # with one at the mark, which may be the last that holds
         levels = np.append(here, np.geomspace(max(low, 1e-9 * high), high, _CURVE_LEVELS))
     panel = plot_stiffness_over_tension(saturated, levels, title="")
-    return _mark(panel, here, N_PER_MM * K.along(u)) if K.is_stable else panel
+    size = 1.0 if panel.get_ylabel().endswith("[N/m]") else 1.0 / N_PER_MM  # of a soft arm
+    return _mark(panel, here, K.along(u) / size) if K.is_stable else panel
 
 
 @style.styled

@@ -13,7 +13,8 @@ from matplotlib.ticker import MaxNLocator
 from cdsm.errors import InvalidInput
 from cdsm.planning.range import StiffnessRange
 from cdsm.plots import style
-from cdsm.plots.style import MM, N_PER_MM, Panels
+from cdsm.plots.style import MM, Panels
+from cdsm.support.format import stiffness_unit
 from cdsm.support.validation import instance
 from cdsm.support.values import Array
 
@@ -71,11 +72,13 @@ def plot_stiffness_ranges(
         remedy = 'subplot_kw={"projection": "polar"}'
         raise InvalidInput("ax", f"is not polar; give one of plt.subplots({remedy}).")
 
+    unit, size = stiffness_unit(*(attainable.high for attainable in every))
+
     def around(row: Sequence[StiffnessRange], values: Sequence[float]) -> tuple[Array, Array]:
         v = np.array([attainable.direction for attainable in row])
         half = np.mod(np.arctan2(v[:, second], v[:, first]), np.pi)
         turn = np.sort(half)
-        radius = N_PER_MM * np.array(values)[np.argsort(half)]
+        radius = np.array(values)[np.argsort(half)] / size
         return np.append(turn, [*(turn + np.pi), turn[0]]), np.append(radius, [*radius, radius[0]])
 
     shades = style.TENSION_COLORS(np.linspace(0.0, 1.0, len(ranges)))
@@ -93,7 +96,7 @@ def plot_stiffness_ranges(
     panel.tick_params(labelsize=7)
     panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08))
     name = every[0].posture.arm.name
-    style.set_title(panel, title, f"{name}: how stiff can it be [N/mm]?")
+    style.set_title(panel, title, f"{name}: how stiff can it be [{unit}]?")
     return panel  # type: ignore[no-any-return]
 
 
@@ -109,11 +112,12 @@ def plot_path_plan(
     above, below = panels
     x = np.arange(float(len(plan.target)))
     rows = list(plan.planned)
-    wanted = N_PER_MM * plan.target.reshape(len(x), -1)
+    unit, size = stiffness_unit(plan.target, plan.achieved)
+    wanted = plan.target.reshape(len(x), -1) / size
     # NaN leaves a gap in the line at samples that are not planned
     achieved = np.full(wanted.shape, np.nan)
     tensions = np.full((len(x), plan.tensions.shape[1]), np.nan)
-    achieved[rows] = N_PER_MM * plan.achieved.reshape(len(rows), wanted.shape[1])
+    achieved[rows] = plan.achieved.reshape(len(rows), wanted.shape[1]) / size
     tensions[rows] = plan.tensions
     for k, u in enumerate(plan.direction.reshape(-1, 3)):
         name = style.direction_name(u)
@@ -129,7 +133,7 @@ def plot_path_plan(
         for i in (sample.index for sample in plan.infeasible):
             look: dict[str, Any] = {"fc": "#fbe3d6", "ec": style.VERMILLION, "hatch": "////"}
             ax.axvspan(i - 0.5, i + 0.5, linewidth=0.0, zorder=0.4, gid="infeasible", **look)
-    above.set_ylabel("stiffness [N/mm]")
+    above.set_ylabel(f"stiffness [{unit}]")
     above.legend(loc="lower right")
     style.whole_numbers(below.xaxis)
     below.set(xlabel="sample", ylabel="tension of each cable [N]")
@@ -152,8 +156,9 @@ def plot_tracking_run(
     panels = style.panels(axs, 1, 4, height=6.4, sharex=True)
     error, stiffness, band, tension = panels
     t = run.time
-    target = N_PER_MM * run.target
-    achieved = N_PER_MM * run.stiffness
+    unit, size = stiffness_unit(run.target, run.stiffness)
+    target = run.target / size
+    achieved = run.stiffness / size
     error.plot(t, MM * run.tip_error, color=style.BLUE, gid="tip error")
     error.set(ylabel="tip error [mm]")
     for k, u in enumerate(run.directions):
@@ -163,7 +168,7 @@ def plot_tracking_run(
         wanted: dict[str, Any] = {"color": color, "linewidth": 0.9, "gid": f"wanted:{name}"}
         stiffness.plot(t, target[:, k], "--", **wanted)
         stiffness.plot(t, achieved[:, k], color=color, label=label, gid=f"reached:{name}")
-    stiffness.set(ylabel="frictionless\nstiffness [N/mm]")
+    stiffness.set(ylabel=f"frictionless\nstiffness [{unit}]")
     if np.nanmin(achieved / target, initial=1.0) < _HALF:  # else no percent is seen
         style.from_zero(stiffness, target, achieved)
     half = MM * run.band

@@ -58,10 +58,15 @@ def largest_finite(values: Array) -> float:
     return float(abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
-def stiffness_text(*values: float) -> str:
+def stiffness_unit(*values: Array | float) -> tuple[str, float]:
+    """Return the unit in which people read stiffnesses [N/m] of this size, and its size."""
+    return display_for("N/m", max(largest_finite(np.atleast_1d(value)) for value in values))
+
+
+def stiffness_text(*values: float, digits: int = 4) -> str:
     """Return a stiffness [N/m], or a range, in a unit for its size: ``3.2 N/mm``, ``0.67 N/m``."""
-    unit, size = display_for("N/m", largest_finite(np.array(values)))
-    return f"{' to '.join(f'{value / size:.4g}' for value in values)} {unit}"
+    unit, size = stiffness_unit(*values)
+    return f"{' to '.join(f'{value / size:.{digits}g}' for value in values)} {unit}"
 
 
 _ROUNDING = 1e-9  # a number of a table below this fraction of the largest is printed as zero

@@ -181,3 +181,30 @@ def test_the_list_of_commands_has_their_whole_first_lines() -> None:
         line = command.get_short_help_str()
         assert line == command.help.partition("\n")[0]
         assert line in " ".join(page.split())
+
+
+def test_an_arm_that_buckles_under_a_weight_says_what_following_motors_hold() -> None:
+    arm = [
+        "--angles",
+        "8",
+        "--minimum",
+        "1",
+        "--maximum",
+        "130",
+        "--set",
+        "wire=2000",
+        "--mass",
+        "4",
+    ]
+    result = call("weigh", str(EXAMPLES / "arm.toml"), *arm)
+    assert result.exit_code == 3
+    robot = cdsm.Manipulator.read(EXAMPLES / "arm.toml")
+    soft = robot.with_cables(
+        [
+            cdsm.Cable(**{**vars(cable), "elasticity": cdsm.LinearElasticity(2000.0)})
+            for cable in robot.cables
+        ]
+    ).at([0.13962634015954636] * robot.nv)
+    following = cdsm.payload(soft, "-z", 1.0, 130.0).following
+    assert following is not None
+    assert f"motors follow: {following.force:.4g} N ({following.mass:.4g} kg)" in result.output

@@ -318,3 +318,12 @@ def test_names_move_apart_in_their_order_and_ticks_are_round() -> None:
     assert moved[1] < moved[2] < moved[0]
     assert np.diff(np.sort(moved)).min() > 0.499
     assert round_numbers(49.7, 95.6) == [50.0, 60.0, 70.0, 80.0, 90.0]
+
+
+def test_soft_arms_are_drawn_in_newtons_per_metre() -> None:
+    rest = cdsm.forward_statics(cdsm.presets.nitinol_segment(), tension=[3.0, 0.0, 0.0])
+    soft = cdsm.stiffness(rest.pose, rest.tension)
+    shares = soft.shares("y")
+    ax = shares.plot()
+    assert ax.get_xlabel() == f"contribution [N/m] to {soft.along('y'):.4g} N/m along y"
+    assert sum(bar.get_width() for bar in ax.patches) == pytest.approx(soft.along("y"))
