@@ -18,9 +18,11 @@ from cdsm.posture import Posture
 from cdsm.support.determination import Determination, chi_square_text, likely
 from cdsm.support.format import aligned, coordinates, plural, span, with_uncertainty
 from cdsm.support.result import Result, quantity, unit
+from cdsm.support.validation import SMALLEST
 from cdsm.support.values import Array, Plotted, frozen
 
 _WIDE = 3.0  # times the instruments by which friction is named in a warning
+_LARGE = 0.5  # Σ μ β of a cable from which on first order misleads
 _CORRELATED = 0.9  # correlation of two loads that is printed
 _SHOWN = 0.05  # part of the largest coefficient of a combination below which one is not printed
 _HALF = 1.96  # half width of an interval of 95 % in standard deviations
@@ -240,6 +242,15 @@ class LoadEstimate(TensionEstimate, Plotted):
             warnings.append(
                 f"friction of unknown direction can hide {listed(wide, 3)}: let each motor pull "
                 "until its cable slides in all holes, read then, and give sliding=1 (--sliding in)"
+            )
+        low = np.maximum(self.segment_low, SMALLEST)
+        exponent = 0.5 * float(
+            np.log(np.maximum(self.segment_high, SMALLEST) / low).max(initial=0.0)
+        )
+        if exponent > _LARGE:
+            warnings.append(
+                f"friction changes a tension by up to e^±{exponent:.2g}: what it can hide is of "
+                "first order, and more than that"
             )
         return (*warnings, *super().warnings)
 

@@ -1,5 +1,6 @@
 """Loads and tensions from exact readings, their uncertainty by differences, and what is told."""
 
+import pickle
 from dataclasses import replace
 from typing import Any
 
@@ -241,6 +242,15 @@ def test_slack_cables_have_no_friction() -> None:
     np.testing.assert_allclose(found.band, bare.band, rtol=0.2)
 
 
+def test_much_friction_is_named() -> None:
+    pose = readme(1.5)
+    found = cdsm.estimate_load(pose, held(pose, [*TIP, 0, 0, 0]), tension_std=0.5)
+    assert "friction changes a tension by up to e^±0." in found.warnings[1]
+    few = readme(0.1)
+    calm = cdsm.estimate_load(few, held(few, [*TIP, 0, 0, 0]), tension_std=0.5)
+    assert not any("e^±" in warning for warning in calm.warnings)
+
+
 def test_coupled_joints_and_springs() -> None:
     arm = cdsm.Manipulator(
         readme_geometry(coupled=True, joint_stiffness=0.8), cdsm.LinearElasticity(2e4)
@@ -294,3 +304,6 @@ def test_results_are_kept_and_exported(tmp_path: Any) -> None:
         found.loads = TIP  # type: ignore[misc]
     assert repr(found).startswith("<LoadEstimate loads -2 to 3")
     assert replace(found, chi_square=0.0).loads is found.loads
+    again = pickle.loads(pickle.dumps(found))
+    assert str(again) == str(found)
+    assert not again.loads.flags.writeable
