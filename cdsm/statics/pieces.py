@@ -23,6 +23,7 @@ PRECISION = 1e-15  # of the share of a root, relative to the step
 _RATE = 1e-6  # change of the share for a difference
 _EVEN = 1e-9  # a tension below this part of the largest is zero: the load decides if it pulls
 _TOUCH = 1e-12  # a stop touches at this distance [rad]
+_JUMP = 1e-6  # part of the change of a value within a step that is left where it should be 0
 _CHANGE = 1e-5  # a rate below this part of the largest is rounding
 
 _LOST = CdsmError("the equilibrium is not found.")
@@ -242,7 +243,10 @@ def _end_of_smooth(at: Callable[[float], Stage | None], here: Stage, there: Stag
                 return here
             if value(first, i) < 0.0:
                 precision = PRECISION * (there.share - here.share)
+                change = abs(before[i] - value(first, i))
                 first = brentq(value, here.share, first, args=(i,), xtol=precision)
+                if abs(value(first, i)) > _JUMP * change:
+                    return None  # the search found another branch on the far side
     except CdsmError:
         return None
     return at(first)
