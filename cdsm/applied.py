@@ -5,7 +5,7 @@ A wrench at the tip alone is kept as the array W (6,), which is fast; see :data:
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, ClassVar
@@ -19,7 +19,6 @@ from cdsm.definition import Term
 from cdsm.errors import InvalidInput, listed
 from cdsm.posture import Posture
 from cdsm.routing import cross
-from cdsm.support.format import coordinates
 from cdsm.support.result import quantity
 from cdsm.support.values import Array, frozen, total
 from cdsm.terms import torque_of
@@ -302,43 +301,6 @@ class Loaded:
     def tip_wrench(self) -> Array:
         """W (6,) of what acts at ``tool0``, base axes: force [N], then moment [N m]."""
         return tip_part(self.applied)
-
-
-def described(arm: ComputedArm, applied: Applied) -> list[dict[str, object]]:
-    """Return the loads for JSON; nothing of a wrench at the tip alone."""
-    return [
-        {
-            "link": at.link,
-            "point_m": at.local,
-            "force_N": W[:3],
-            "moment_Nm": W[3:],
-            **({"of_the_arm": True} if own else {}),
-        }
-        for own, at, W in _on_links(arm, applied)
-    ]
-
-
-def _on_links(arm: ComputedArm, applied: Applied) -> Iterator[tuple[bool, LinkPoint, Array]]:
-    """Yield whether a load belongs to the arm, its place and its wrench; none at the tip."""
-    yield from ((True, at, W) for at, W in arm.own_loads)
-    yield from ((False, load.at, load.wrench) for load in as_loads(applied).on_links)
-
-
-def texts(arm: ComputedArm, applied: Applied) -> list[str]:
-    """Return a line for each load that does not act at the tip, with its place."""
-    lines = []
-    for own, at, W in _on_links(arm, applied):
-        parts = [f"{coordinates(W[:3])} N"] * bool(W[:3].any())
-        parts += [f"{coordinates(W[3:])} N m"] * bool(W[3:].any())
-        where = f"{coordinates(1e3 * at.local)} mm in its frame"
-        whose = "load of the arm" if own else "load"
-        lines.append(f"{whose} on {at.link}, {where}: {', '.join(parts) or 'none'}")
-    return lines
-
-
-def own_loads(arm: ComputedArm) -> list[str]:
-    """Return a line for each load that belongs to an arm, with its place."""
-    return texts(arm, np.zeros(6))
 
 
 def without_cables(

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.applied import Loads
+from cdsm.batch.applied_rows import AppliedRows, RowLoads
 from cdsm.batch.quantities import Codes, OfPostures
-from cdsm.batch.rows import AppliedRows, RowLoads, Rows
+from cdsm.batch.rows import Rows
 from cdsm.batch.solution import solve_rows
 from cdsm.dead_loads import LinkPoint, Load, placed_loads
 from cdsm.errors import InvalidInput

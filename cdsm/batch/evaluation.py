@@ -10,6 +10,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.batch.applied_rows import RowLoads
 from cdsm.batch.distribution import (
     RowsOfLoads,
     Tensions,
@@ -19,7 +20,7 @@ from cdsm.batch.distribution import (
     postures,
 )
 from cdsm.batch.quantities import Codes, OfPostures
-from cdsm.batch.rows import RowLoads, Rows
+from cdsm.batch.rows import Rows
 from cdsm.batch.solution import solve_rows
 from cdsm.errors import InvalidInput, unknown
 from cdsm.manipulator import ANOTHER_ARM, Manipulator

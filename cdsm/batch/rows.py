@@ -15,9 +15,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.applied import Applied, Loads, PointLoad, TipLoad, as_loads, tip_part
+from cdsm.batch.applied_rows import RowLoads
 from cdsm.batch.quantities import Codes
-from cdsm.dead_loads import LinkPoint
 from cdsm.errors import InvalidInput, listed
 from cdsm.manipulator import Manipulator
 from cdsm.routing import Indices
@@ -104,55 +103,6 @@ class LoadArrays(NamedTuple):
     frame: Indices  # frame of each point (L,)
     point: Array  # in this frame (L, 3) [m]
     wrench: Array  # force and moment, base axes (B, L, 6, W)
-
-
-@dataclass(frozen=True, eq=False)
-class RowLoads:
-    """Loads on links, for all postures or for each."""
-
-    points: tuple[LinkPoint, ...]
-    wrenches: Array  # (1, L, 6) for all rows or (N, L, 6): force [N], then moment [N m]
-
-    def of(self, rows: Indices | slice) -> RowLoads:
-        """Return the loads of some rows."""
-        if len(self.wrenches) == 1:
-            return self
-        return RowLoads(self.points, frozen(self.wrenches[rows]))
-
-
-class AppliedRows(NamedTuple):
-    """What acts on an arm in each row."""
-
-    at_tip: Array  # W (6,) for all rows or (N, 6): force [N], then moment [N m]
-    loads: RowLoads | None = None  # on links
-
-    @classmethod
-    def of(cls, cases: Sequence[Applied]) -> AppliedRows:
-        """Return rows in each of which another case acts."""
-        at_tip = frozen(np.array([tip_part(applied) for applied in cases]))
-        on_links = [as_loads(applied).on_links for applied in cases]
-        points = {load.at.key: load.at for loads in on_links for load in loads}
-        if not points:
-            return cls(at_tip)
-        place = {key: i for i, key in enumerate(points)}
-        wrenches = np.zeros((len(cases), len(points), 6))
-        for row, loads in zip(wrenches, on_links, strict=True):
-            for load in loads:
-                row[place[load.at.key]] += load.wrench
-        return cls(at_tip, RowLoads(tuple(points.values()), frozen(wrenches)))
-
-    def case(self, row: int) -> Applied:
-        """Return what acts in a row."""
-        at_tip = self.at_tip if self.at_tip.ndim == 1 else frozen(self.at_tip[row].copy())
-        if self.loads is None:
-            return at_tip
-        wrenches = self.loads.wrenches[row if len(self.loads.wrenches) > 1 else 0]
-        pairs = zip(self.loads.points, wrenches, strict=True)
-        return Loads((TipLoad(at_tip), *(PointLoad(at, frozen(W.copy())) for at, W in pairs)))
-
-    def of_rows(self, rows: Indices) -> AppliedRows:
-        """Return what acts in some rows, of as many rows as there are."""
-        return AppliedRows(self.at_tip[rows], self.loads.of(rows) if self.loads else None)
 
 
 _KERNELS = frozenset(("gravity", "springs"))  # terms of an arm that the kernels compute

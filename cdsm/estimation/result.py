@@ -10,10 +10,11 @@ from typing import Any, final
 
 import numpy as np
 
-from cdsm.applied import Applied, acts, texts, tip_part
+from cdsm.applied import Applied, acts, tip_part
 from cdsm.dead_loads import Load
 from cdsm.errors import listed
 from cdsm.estimation.components import Components
+from cdsm.load_texts import texts
 from cdsm.posture import Posture
 from cdsm.support.determination import Determination, chi_square_text, likely
 from cdsm.support.format import aligned, coordinates, plural, span, with_uncertainty

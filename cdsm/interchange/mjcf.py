@@ -22,11 +22,11 @@ import numpy as np
 from lxml import etree
 from numpy.typing import ArrayLike
 
-from cdsm.applied import texts
 from cdsm.definition import refuse_terms
 from cdsm.errors import InvalidInput, listed, warn
 from cdsm.interchange.mjcf_bodies import LEAST_INERTIA, add_bodies, add_loads, couple
 from cdsm.interchange.mjcf_cables import add_path, pulley_remarks, row, side_sites
+from cdsm.load_texts import texts
 from cdsm.manipulator import Manipulator
 from cdsm.motors import YIELDING_REMEDY, refuse_yielding
 from cdsm.posture import Posture

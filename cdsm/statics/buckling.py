@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.applied import Applied, Loaded, acts, combined, scaled, tip_only, tip_part
+from cdsm.batch.applied_rows import AppliedRows
 from cdsm.batch.evaluation import evaluate
-from cdsm.batch.rows import AppliedRows
 from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput, warn
 from cdsm.geometry.beams import buckling_doubt
 from cdsm.loads import LoadsLike, loads_of

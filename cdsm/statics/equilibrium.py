@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.applied import Applied, Loaded, described, texts
+from cdsm.applied import Applied, Loaded
 from cdsm.errors import InvalidInput, SingularStiffness, listed
+from cdsm.load_texts import described, texts
 from cdsm.loads import LoadsLike, loads_of
 from cdsm.posture import Posture
 from cdsm.statics.events import Event, events_text

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cdsm.applied import Applied, as_loads
-from cdsm.batch.rows import AppliedRows
+from cdsm.batch.applied_rows import AppliedRows
 from cdsm.dead_loads import LinkPoint
 from cdsm.posture import Posture
 from cdsm.support.values import Array, frozen, total

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdsm.applied import texts
 from cdsm.errors import SingularStiffness
+from cdsm.load_texts import texts
 from cdsm.quantities import display_for
 from cdsm.stiffness_matrix.verdict import least_joint_stiffness
 from cdsm.support.format import (

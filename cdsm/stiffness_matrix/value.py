@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm import readings
-from cdsm.applied import Applied, Loaded, described, jacobian_at, required_torque
+from cdsm.applied import Applied, Loaded, jacobian_at, required_torque
 from cdsm.errors import InvalidInput, SingularStiffness, listed
+from cdsm.load_texts import described
 from cdsm.loads import link_point
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints

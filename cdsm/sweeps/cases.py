@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.applied import Applied
+from cdsm.batch.applied_rows import AppliedRows
 from cdsm.batch.evaluation import Batch, evaluate
 from cdsm.batch.quantities import derive
-from cdsm.batch.rows import AppliedRows
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.measures.clearance import KINDS, distances

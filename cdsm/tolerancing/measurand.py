@@ -11,8 +11,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.batch.applied_rows import AppliedRows
 from cdsm.batch.quantities import Codes, derive
-from cdsm.batch.rows import AppliedRows, Rows
+from cdsm.batch.rows import Rows
 from cdsm.batch.solution import solve_rows
 from cdsm.errors import InvalidInput
 from cdsm.loads import LoadsLike

@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from cdsm.applied import own_loads
 from cdsm.cable import wires_text
 from cdsm.errors import SingularStiffness
+from cdsm.load_texts import own_loads
 from cdsm.manipulator import Manipulator
 from cdsm.plots.style import DARK, MM, VERMILLION
 from cdsm.quantities import display_for
