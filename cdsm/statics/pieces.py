@@ -245,7 +245,7 @@ def _end_of_smooth(at: Callable[[float], Stage | None], here: Stage, there: Stag
                 precision = PRECISION * (there.share - here.share)
                 change = abs(before[i] - value(first, i))
                 first = brentq(value, here.share, first, args=(i,), xtol=precision)
-                if abs(value(first, i)) > _JUMP * change:
+                if abs(value(first, i)) > _JUMP * change + _EVEN:
                     return None  # the search found another branch on the far side
     except CdsmError:
         return None
