@@ -97,6 +97,10 @@ _ROBOT: Final = ONE  # key of the geometry, of which files have only the parts; 
 _NO_ROBOT: Final = (
     "describes no robot; give [universal], [hinged], [backbone], [rolling], [[sections]] or [urdf]"
 )
+_NO_TABLE: Final = (
+    "joints: a number of joints stands in the table of their kind, below [universal], [hinged], "
+    "[backbone] or [rolling], with their sizes; cdsm new writes such a file"
+)
 _FORMS: Final = (
     *("universal", "hinged", "backbone", "rolling"),
     *("sections", "geometry", "joints", "links"),
@@ -133,6 +137,8 @@ def _described(tables: dict[str, Any]) -> Geometry:
     """Build the geometry; a key of the whole file that stands in one of its tables is told so."""
     if not tables:
         raise CrossFaults([_NO_ROBOT])
+    if isinstance(tables.get("joints"), int):
+        raise CrossFaults([_NO_TABLE])
     try:
         return toml.build(tables)
     except GeometryError as error:

@@ -249,7 +249,6 @@ def critical_load(
     load: LoadsLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
-    *,
     wrench: LoadsLike = NO_WRENCH,
 ) -> CriticalLoad:
     """Compute the factor λ up to which an arm at a fixed posture is stable under λ load + wrench.

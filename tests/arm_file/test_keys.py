@@ -46,3 +46,10 @@ def test_changes_take_tables_or_keys_with_dots() -> None:
     dotted = cdsm.Manipulator.read(EXAMPLE, changes={"universal.hole_radius": 0.03, "minimum": 4.0})
     assert dotted.geometry == nested.geometry
     assert dotted.cables[0].minimum == 4.0
+
+
+def test_a_number_of_joints_at_the_top_is_told_its_table(tmp_path: Path) -> None:
+    file = tmp_path / "arm.toml"
+    file.write_text("joints = 4\nwire = 36.8e3\n")
+    with pytest.raises(cdsm.CdsmError, match=r"below \[universal\]"):
+        cdsm.Manipulator.read(file)
