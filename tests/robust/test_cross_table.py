@@ -323,7 +323,6 @@ REFUSED: list[Refusal] = [
         )
     ),
     ("MuJoCo", frozenset(["yielding motors"]), "pair yields, and a model in MuJoCo has rigid"),
-    ("uncertainty", frozenset(["pulleys"]), r"over\+1'?: runs over the pulley .* no errors of pul"),
 ]
 
 
