@@ -20,6 +20,7 @@ import cdsm
 from cdsm.cli import app
 from cdsm.status import Status
 from cdsm.view import history, live_view, serve
+from cdsm.view.curve import compute_curve
 from cdsm.view.live_view import View
 from cdsm.view.ranges import force_range, tension_range
 from cdsm.view.state import Setting
@@ -224,6 +225,27 @@ def test_the_curve_is_the_stiffness_under_each_least_tension(view: View) -> None
     pose = view.arm.at(view.shown.setting.q)
     K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, STABLE, 200.0))
     assert np.nanmax(here) == pytest.approx(1e-3 * K.along("x"))
+
+
+def test_the_curve_ends_where_the_maximum_leaves_no_tensions() -> None:
+    arm = soft_arm()
+    at = replace(setting(arm), maximum=50.0)
+    curve = compute_curve(show(arm, at), "z", (0.0, 50.0), lambda: False)
+    assert curve is not None
+    pose = arm.at(at.q)
+    low, high = 0.0, 50.0
+    while high - low > 1e-3:
+        middle = (low + high) / 2.0
+        try:
+            cdsm.distribute_tension(pose, middle, 50.0)
+            low = middle
+        except cdsm.InfeasibleTension:
+            high = middle
+    (above,) = re.findall(r"INFEASIBLE above ([\d.]+) N", "; ".join(curve.gaps))
+    assert float(above) == pytest.approx(low, abs=0.06)
+    last = curve.tension[np.isfinite(curve.along)][-1]
+    assert last == pytest.approx(low, abs=0.06)
+    assert compute_curve(show(arm, at), "z", (0.0, 50.0), lambda: True) is None
 
 
 def test_the_matrix_is_that_of_the_tip(view: View) -> None:

@@ -302,6 +302,8 @@ def test_marks_of_a_sheath_and_of_a_divided_post(finger: View) -> None:
     np.testing.assert_allclose(points[own[:4], 2], 0.008 * (np.arange(4) + 0.5) / 4, atol=1e-12)
     post = points[own][abs(np.linalg.norm(points[own], axis=1) - 0.008) < 1e-9]
     assert len(post) > 3
-    turn = np.unwrap(np.arctan2(-post[:, 2], post[:, 0]))
+    turn = np.unwrap(np.arctan2(-post[:, 2], post[:, 0]))  # as the cable goes, from the top down
+    step = pose.segments.wrap[own[4:][: len(post)]]
+    np.testing.assert_allclose(np.diff(turn), step[1:], rtol=0.2)  # at the joint's middle: equal
     np.testing.assert_allclose(np.diff(turn), np.diff(turn)[0], rtol=1e-9)
     np.testing.assert_allclose(np.linalg.norm(along[own], axis=1), 1.0)
