@@ -257,8 +257,10 @@ def test_planned_tests_have_their_counts_and_intervals() -> None:
 
 
 def test_designs_have_their_objectives_and_the_compromise_a_ring() -> None:
-    search = cdsm.search_designs(designs.problem(), generations=2, population=8, seed=1)
-    objectives = search.problem.objectives
+    objectives = tuple(cdsm.Objective(name) for name in ("tension", "wire_length"))
+    task = designs.problem(objectives=objectives)
+    search = cdsm.search_designs(task, generations=2, population=12, seed=1)
+    assert 0 < search.compromise < len(search.front) - 1
     axs = search.plot()
     values = [search.best[each.key] / each.unit[1] for each in objectives]
     labels = [" ".join(label.split()) for label in search.objective_labels]
