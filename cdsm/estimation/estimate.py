@@ -112,7 +112,7 @@ def estimate_load(
             f"{plural(len(names), 'component')} sought, but the joints give "
             f"{plural(equations, 'equation')}{off}; seek fewer.",
         )
-    holes, balance = _solved(readings, components, 0.0 * readings.sliding)
+    holes, balance = _solved(readings, components)
     scale = components.columns(pose).scale
     instruments = _covariance(balance, readings.instruments, holes)
     by_hole = balance.gain @ balance.by_hole
@@ -166,7 +166,7 @@ def estimate_tensions(
         50.8, 48.0 to 53.7 N
     """
     readings = checked_readings(pose, motor_tensions, tension_std, angle_std, sliding, wrench)
-    holes, balance = _solved(readings, Components((), ()), 0.0 * readings.sliding)
+    holes, balance = _solved(readings, Components((), ()))
     return TensionEstimate(**_tensions(readings, holes, balance))
 
 
@@ -277,10 +277,10 @@ def _stopped(readings: CheckedReadings) -> tuple[str, ...]:
 
 
 def _solved(
-    readings: CheckedReadings, components: Components, followed: Array
+    readings: CheckedReadings, components: Components, followed: Array | None = None
 ) -> tuple[Holes, LoadBalance]:
     taut = readings.motor_tension > 0.0
-    holes = holes_of(readings.pose, followed, readings.sliding, taut)
+    holes = holes_of(readings.pose, readings.sliding, taut, followed)
     balance = balance_loads(
         readings.pose,
         readings.motor_tension,

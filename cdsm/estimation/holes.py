@@ -37,22 +37,29 @@ class Holes(NamedTuple):
     known: Array  # its part where the direction is known (P, P)
 
 
-def holes_of(pose: Posture, followed: Array, sliding: Array, taut: NDArray[np.bool_]) -> Holes:
+def holes_of(
+    pose: Posture, sliding: Array, taut: NDArray[np.bool_], followed: Array | None = None
+) -> Holes:
     """Describe the holes of cables that are ``taut`` (C,).
 
     ``sliding`` (P,) is 1 where the cable was taken in, −1 let out, 0 unknown; there s is expected
-    to be ``followed`` (P,).
+    to be that of a ``followed`` history (P,), whose errors are those of single holes; or else 0.
     """
     segments = pose.segments
     cable = segments.chains.cable[segments.chains.hole]
     grip = np.where(can_stick(pose) & taut[cable], segments.grip, 0.0)
     is_known = sliding != 0.0
-    mean = np.where(is_known, -sliding * grip, np.clip(followed, -grip, grip))
+    expected = 0.0 * grip if followed is None else np.clip(followed, -grip, grip)
+    mean = np.where(is_known, -sliding * grip, expected)
     bound = np.where(is_known, 0.0, grip + abs(mean))
     spread = np.where(is_known, _KNOWN * grip, 0.0)
     same = cable[:, None] == cable
     known = same * np.outer(spread, spread)
-    covariance = known + same * np.outer(bound, bound) + np.diag(_OWN * bound**2)
+    if followed is None:
+        unknown = same * np.outer(bound, bound) + np.diag(_OWN * bound**2)
+    else:
+        unknown = np.diag(np.where(is_known, 0.0, grip) ** 2 / 3.0)
+    covariance = known + unknown
     return Holes(mean, bound, covariance, known)
 
 

@@ -141,7 +141,7 @@ class _Problem:
         self.cable = pose.segments.chains.cable
         self.start = pose.segments.chains.start
         self.taut = F > 0.0
-        holes = holes_of(pose, 0.0 * sliding, sliding, self.taut)
+        holes = holes_of(pose, sliding, self.taut)
         self.bound = holes.bound
         self.open = _root(holes.covariance - holes.known)
         self.tenth = _root(holes.known)
@@ -172,7 +172,7 @@ class _Problem:
         nv, C = self.arm.nv, self.F.size
         pose = self.arm.at(x[:nv], check_limits=False)
         segments = pose.segments
-        holes = holes_of(pose, 0.0 * self.sliding, self.sliding, self.taut)
+        holes = holes_of(pose, self.sliding, self.taut)
         growth = np.exp(self.behind @ (holes.mean + self.root @ x[nv + C :]))
         T = (self.F + self.std * x[nv : nv + C])[self.cable] * growth
         chains = segments.chains

@@ -95,6 +95,17 @@ def test_payload_that_nobody_told_of_is_felt() -> None:
     assert abs(run.stiffness_error[5:]).max() < 0.02
 
 
+def test_force_under_friction_is_felt_within_its_band() -> None:
+    """A followed history errs hole by hole: the force is nearer than its band by far."""
+    run = cdsm.track(circle(0.1, 4), "mixed", payload=0.2, steps=4, **BOUNDS)
+    before = np.vstack([np.zeros(6), run.wrench[:-1]])
+    off = abs(run.estimated_force - before[:, :3])
+    assert (off <= run.estimated_force_band).all()
+    root = np.sqrt((off**2).mean(axis=0))
+    assert (root < 0.1 * run.estimated_force_band.mean(axis=0)).all()
+    assert "by friction" in str(run)
+
+
 def test_wrong_arguments_are_refused() -> None:
     plan = small_path()
     broken = cdsm.plan_path(plan.arm, "z", [15e3, 90e3], 10.0, 250.0, angles=plan.angles[:2])
