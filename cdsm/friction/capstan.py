@@ -14,7 +14,7 @@ from cdsm.cable_laws import group_by_law
 from cdsm.motors import refuse_rough
 from cdsm.posture import Posture
 from cdsm.routing import Indices
-from cdsm.stiffness_matrix import FrictionState, Stiffness, assemble
+from cdsm.stiffness_matrix import FrictionState, Stiffness, assemble_stiffness
 from cdsm.support.values import Array, Flags, frozen, total
 from cdsm.tension import Tension
 from cdsm.wires.elasticity import Elasticity
@@ -209,7 +209,7 @@ def assemble_segments(
     if pose.arm.motors.yielding is not None:  # without friction
         F = frozen(tension[pose.segments.chains.start[:-1]])
         k = pose.arm.laws.stiffness(pose.cable_lengths, F)
-        return assemble(pose, F, wrench, k, distribution)
+        return assemble_stiffness(pose, F, wrench, k, distribution)
     segments = pose.segments
     laws = pose.segments.chains.laws
     chains = segments.chains
@@ -233,7 +233,7 @@ def assemble_segments(
         passive = (passive + passive.T) / 2.0  # symmetric but for rounding
     F = frozen(tension[chains.start[:-1]])
     k = pose.arm.laws.stiffness(pose.cable_lengths, F)
-    frictionless = assemble(pose, F, wrench, k, distribution)
+    frictionless = assemble_stiffness(pose, F, wrench, k, distribution)
     terms = {**frictionless.terms, "active": active, "passive": frozen(passive)}
     return replace(
         frictionless,

@@ -5,22 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-Point = tuple[float, float, float]
+Triple = tuple[float, float, float]
 
-AXES: Final[tuple[Point, Point, Point]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+JOINT_AXES: Final[tuple[Triple, Triple, Triple]] = (
+    (1.0, 0.0, 0.0),
+    (0.0, 1.0, 0.0),
+    (0.0, 0.0, 1.0),
+)
 """Axes x, y and z of joints."""
 
 
-class Body(NamedTuple):
+class SerialBody(NamedTuple):
     """A link behind joints whose axes meet in one point."""
 
     name: str
-    at: Point  # that point in the frame of the link before [m]
-    axes: tuple[Point, ...]  # of the joints, in their order
+    at: Triple  # that point in the frame of the link before [m]
+    axes: tuple[Triple, ...]  # of the joints, in their order
     limit: float  # of the joints, in both directions [rad]
     mass: float  # [kg]
-    centre: Point  # of mass [m]
-    inertia: Point  # ixx, iyy, izz about it [kg m²]
+    centre: Triple  # of mass [m]
+    inertia: Triple  # ixx, iyy, izz about it [kg m²]
 
 
 INERTIAL = """    <inertial>
@@ -37,7 +41,7 @@ JOINT = """  <joint name="{name}_joint{i}" type="revolute">
     <limit lower="{lower}" upper="{upper}" effort="1" velocity="1"/>
   </joint>
 """
-TIP = """  <link name="tool0"/>
+TIP_LINK = """  <link name="tool0"/>
   <joint name="tool0_joint" type="fixed">
     <parent link="{parent}"/>
     <child link="tool0"/>
@@ -47,23 +51,25 @@ TIP = """  <link name="tool0"/>
 """
 
 
-def text(point: Sequence[float]) -> str:
+def numbers_of(point: Sequence[float]) -> str:
     """Write numbers with a blank between them."""
     return " ".join(map(repr, point))
 
 
-def chain(name: str, bodies: Sequence[Body], tip: Point) -> str:
+def chain(name: str, bodies: Sequence[SerialBody], tip: Triple) -> str:
     """Write the URDF of bodies in series; ``tool0`` is at ``tip`` of the last one."""
-    said, parent = f'<robot name="{name}">\n  <link name="base"/>\n', "base"
+    urdf = f'<robot name="{name}">\n  <link name="base"/>\n'
+    parent = "base"
     for body in bodies:
         xx, yy, zz = body.inertia
-        mass = INERTIAL.format(centre=text(body.centre), mass=body.mass, xx=xx, yy=yy, zz=zz)
+        mass = INERTIAL.format(centre=numbers_of(body.centre), mass=body.mass, xx=xx, yy=yy, zz=zz)
         limits = {"lower": -body.limit, "upper": body.limit}
         for i, axis in enumerate(body.axes, start=1):
-            last, at = i == len(body.axes), body.at if i == 1 else (0.0, 0.0, 0.0)
+            last = i == len(body.axes)
+            at = body.at if i == 1 else (0.0, 0.0, 0.0)
             ends = {"parent": parent, "child": body.name if last else f"{body.name}_{i}"}
-            said += f'  <link name="{ends["child"]}">\n{mass if last else ""}  </link>\n'
-            places = {"at": text(at), "axis": text(axis)}
-            said += JOINT.format(name=body.name, i=i, **ends, **places, **limits)
+            urdf += f'  <link name="{ends["child"]}">\n{mass if last else ""}  </link>\n'
+            places = {"at": numbers_of(at), "axis": numbers_of(axis)}
+            urdf += JOINT.format(name=body.name, i=i, **ends, **places, **limits)
             parent = ends["child"]
-    return said + TIP.format(parent=parent, at=text(tip))
+    return urdf + TIP_LINK.format(parent=parent, at=numbers_of(tip))

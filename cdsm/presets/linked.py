@@ -10,7 +10,7 @@ import numpy as np
 from cdsm.cable import Cable
 from cdsm.cable_path import Site
 from cdsm.manipulator import Manipulator
-from cdsm.presets.bodies import AXES, Body, chain
+from cdsm.presets.bodies import JOINT_AXES, SerialBody, chain
 from cdsm.presets.prototype import ELASTIC_STAGE
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity
@@ -34,12 +34,12 @@ def sjtu_snake(elasticity: Elasticity = ELASTIC_STAGE) -> Manipulator:
         >>> arm.nv, len(arm.cables)
         (24, 36)
     """
-    (_, y, z) = AXES
+    (_, y, z) = JOINT_AXES
     radius, after, before, length = 0.019, 0.01357, 0.09257, 0.09921
     centre, inertia = (0.0477162, 0.0, 0.0), (2.459410464e-5, 8.238686351e-5, 8.257404573e-5)
     at = [(length if k else 0.0, 0.0, 0.0) for k in range(_SECTIONS)]
     kept = (z, y), 0.35, 0.061973305, centre, inertia
-    bodies = [Body(f"link{k + 1}", at[k], *kept) for k in range(_SECTIONS)]
+    bodies = [SerialBody(f"link{k + 1}", at[k], *kept) for k in range(_SECTIONS)]
     cables = []
     for k in range(1, _SECTIONS + 1):
         for j in range(3):

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from cdsm.cable import Cable
 from cdsm.cable_path import Site
 from cdsm.manipulator import Manipulator
-from cdsm.presets.bodies import AXES, Body, chain
+from cdsm.presets.bodies import JOINT_AXES, SerialBody, chain
 from cdsm.springs import SpringLaw
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity
@@ -72,7 +72,7 @@ def spirob(
         >>> (1e3 * rest.pose.tip[:3, 3]).round(1).tolist()
         [370.7, 0.0, 190.2]
     """
-    (_, y, _) = AXES
+    (_, y, _) = JOINT_AXES
     bodies = []
     sides: tuple[list[Site], list[Site]] = ([], [])
     before = 0.0
@@ -85,7 +85,7 @@ def spirob(
             along = mass * (length**2 + width**2) / 12.0
             inertia = mass * width**2 / 6.0, along, along
             middle = length / 2.0, 0.0, 0.0
-            bodies.append(Body(name, (before, 0.0, 0.0), (y,), _LIMIT, mass, middle, inertia))
+            bodies.append(SerialBody(name, (before, 0.0, 0.0), (y,), _LIMIT, mass, middle, inertia))
         before = length
         for sign, sites in zip((1.0, -1.0), sides, strict=True):
             sites += [

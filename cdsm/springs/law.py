@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pydantic import Discriminator, PlainSerializer, PlainValidator, Tag
 
 from cdsm.errors import InvalidInput, warn
-from cdsm.springs.shapes import Function, Given, Power, Shape, Table
+from cdsm.springs.shapes import AngleFunction, Given, Power, Shape, TorqueTable
 from cdsm.support import records
 from cdsm.support.validation import (
     SMALLEST,
@@ -136,13 +136,13 @@ class SpringLaw:
             raise InvalidInput("torques", problem + remedy)
         for doubt in doubts_about_angle("an angle of a spring is", float(abs(x).max()), _TURN):
             warn(doubt)
-        return SpringLaw(Table(tuple(x.tolist()), tuple(y.tolist())), scalar("angle", angle))
+        return SpringLaw(TorqueTable(tuple(x.tolist()), tuple(y.tolist())), scalar("angle", angle))
 
     @staticmethod
     def function(
-        torque: Function,
-        stiffness: Function | None = None,
-        energy: Function | None = None,
+        torque: AngleFunction,
+        stiffness: AngleFunction | None = None,
+        energy: AngleFunction | None = None,
         *,
         angle: float = 0.0,
     ) -> SpringLaw:
@@ -239,7 +239,7 @@ class SpringLaw:
         return f"SpringLaw.{kind}({text})" + f".scaled({factor!r})" * (factor != 1.0)
 
 
-_NAMES: Final[dict[type, str]] = {Power: "power", Table: "table", Given: "function"}
+_NAMES: Final[dict[type, str]] = {Power: "power", TorqueTable: "table", Given: "function"}
 _NEAR = 1e-3  # an angle [rad] near rest, whose torque the torque at rest is compared with
 _AT_REST = 1e-9
 

@@ -12,7 +12,7 @@ import numpy as np
 from cdsm.errors import InvalidInput
 from cdsm.support.values import Array
 
-Function = Callable[[Array], Any]
+AngleFunction = Callable[[Array], Any]
 """Function of angles x from rest, an array of any shape, which returns one of the same shape."""
 
 _LEAST = 0.1  # of the last chord of a table: the least slope at its end, where PCHIP may be flat
@@ -95,7 +95,7 @@ class Power:
 
 
 @dataclass(frozen=True)
-class Table:
+class TorqueTable:
     """Torques at angles, through rest: monotone cubics (PCHIP), and straight beyond the ends.
 
     Points on one side of rest alone stand for the other side, too.
@@ -182,9 +182,9 @@ class Given:
     Shapes are equal if their functions are the same objects.
     """
 
-    function: Function
-    derivative: Function | None = None
-    integral: Function | None = None
+    function: AngleFunction
+    derivative: AngleFunction | None = None
+    integral: AngleFunction | None = None
     factor: float = 1.0
 
     @property
@@ -259,7 +259,7 @@ class Given:
         return ""
 
 
-def _values(name: str, function: Function, x: Array) -> Array:
+def _values(name: str, function: AngleFunction, x: Array) -> Array:
     """Return what a function of the user gives; InvalidInput if these are no numbers like x."""
     try:
         values = np.asarray(function(x), dtype=np.float64)

@@ -14,7 +14,7 @@ from cdsm.locked_wires import LockedWires
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.solve import ArmState
-from cdsm.stiffness_matrix import Stiffness, assemble
+from cdsm.stiffness_matrix import Stiffness, assemble_stiffness
 from cdsm.support.values import Array, frozen
 from cdsm.terms import ConstantPull, Stretch, stiffness_of, torque_of, torque_size_of
 from cdsm.wires.elasticity import Elasticity
@@ -95,7 +95,7 @@ class LockedArm:
         for locked in self._wires.held:
             require_domain(pose.arm, locked.law, locked.cables, F[locked.cables])
         lengths = pose.cable_lengths if self.tension_held else self.rest_length
-        return assemble(pose, frozen(F), self.wrench, frozen(k), free_length=lengths)
+        return assemble_stiffness(pose, frozen(F), self.wrench, frozen(k), free_length=lengths)
 
     def continued_tensions(self, pose: Posture) -> Array:
         """Compute F (C,) [N] at a posture, negative where the wire of a cable is too long.

@@ -10,13 +10,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cdsm.errors import CdsmError
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import NEUTRAL, Balance, Point, continued, stable_between
-from cdsm.support.values import Array
+from cdsm.support.values import Array, Flags
 
 PRECISION = 1e-15  # of the share of a root, relative to the step
 
@@ -27,8 +26,6 @@ _JUMP = 1e-6  # part of the change of a value within a step that is left where i
 _CHANGE = 1e-5  # a rate below this part of the largest is rounding
 
 _LOST = CdsmError("the equilibrium is not found.")
-
-Flags = NDArray[np.bool_]
 
 Model = Callable[[float], LockedArm]
 """Arm under a share of the load and of the pull."""

@@ -4,7 +4,7 @@ K_θ = H_L·F + J_Lᵀ K_L J_L + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ             
       active   passive       gravity   load
 """
 
-from cdsm.stiffness_matrix.assembly import assemble as assemble
+from cdsm.stiffness_matrix.assembly import assemble_stiffness as assemble_stiffness
 from cdsm.stiffness_matrix.assembly import checked_tension as checked_tension
 from cdsm.stiffness_matrix.assembly import stiffness as stiffness
 from cdsm.stiffness_matrix.report import Comparison as Comparison

@@ -44,7 +44,7 @@ def stiffness(
     """
     F, W = checked_tension(pose, tension, wrench)
     k = pose.arm.laws.stiffness(pose.cable_lengths, F)
-    return assemble(pose, F, W, k, tension if isinstance(tension, Tension) else None)
+    return assemble_stiffness(pose, F, W, k, tension if isinstance(tension, Tension) else None)
 
 
 def checked_tension(
@@ -69,7 +69,7 @@ def checked_tension(
     return tension.values, tension.applied
 
 
-def assemble(
+def assemble_stiffness(
     pose: Posture,
     tension: Array,
     wrench: Applied,
