@@ -10,6 +10,7 @@ J. Appl. Mech. 39, 1972).
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from cdsm.statics.pieces import (
     next_on_piece,
     piece_of,
     rate,
+    root,
     under,
 )
 from cdsm.statics.solve import FAR, Balance, least_eigenvalue
@@ -109,8 +111,6 @@ def _end_of_piece(model: Model, last: Stage) -> tuple[Stage, int | None]:
 
     Returns the equilibrium there and the cable; None where the smallest eigenvalue λ of K_θ is 0.
     """
-    from scipy.optimize import brentq  # slow to import
-
     kept = piece_of(model, last)
     taut = last.taut
     assert taut is not None
@@ -137,6 +137,9 @@ def _end_of_piece(model: Model, last: Stage) -> tuple[Stage, int | None]:
         F = np.where(stage.arm.locks, np.where(taut, F, -F), math.inf)
         return np.append(F, least_eigenvalue(stage.balance, stage.point))
 
+    def one_value(i: int, distance: float) -> float:
+        return float(values(distance)[i])
+
     low = 0.0
     high = (1.0 if still else length) * _FINEST * max(last.share, 1e-9)
     farthest = last.share if still else FAR
@@ -147,9 +150,7 @@ def _end_of_piece(model: Model, last: Stage) -> tuple[Stage, int | None]:
             raise _LOST
     before = values(low)
     roots = {
-        i: brentq(lambda way, i=i: values(way)[i], low, high, xtol=1e-300, rtol=1e-14)
-        if before[i] > 0.0
-        else low
+        i: root(partial(one_value, i), low, high, 1e-300, 1e-14) if before[i] > 0.0 else low
         for i in np.flatnonzero(values(high) <= 0.0).tolist()
     }
     first = min(roots, key=lambda i: roots[i])

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Final, Generic, Literal, NamedTuple, Protocol, TypeVar, final
 
@@ -22,7 +23,16 @@ from cdsm.statics.contact_events import contact_angles, contact_names, is_beside
 from cdsm.statics.continuation import follow
 from cdsm.statics.hung_loads import total_force
 from cdsm.statics.locked_arm import LockedArm
-from cdsm.statics.pieces import PRECISION, Model, Stage, dip, equilibrium_near, slope, stage_at
+from cdsm.statics.pieces import (
+    PRECISION,
+    Model,
+    Stage,
+    dip,
+    equilibrium_near,
+    root,
+    slope,
+    stage_at,
+)
 from cdsm.support.values import Array
 
 Kind = Literal[
@@ -307,8 +317,6 @@ def crossings(
 
     ``precision`` is that of a share, relative to the step.
     """
-    from scipy.optimize import brentq  # slow to import
-
     low = here.share
     high = there.share
     before = watch.value(here)
@@ -325,7 +333,7 @@ def crossings(
     for i in np.flatnonzero((before >= -none) & (after < -none)).tolist():
         share = low
         if before[i] > none[i]:
-            share = brentq(value, low, high, args=(i,), xtol=precision * (high - low))
+            share = root(partial(value, i=i), low, high, precision * (high - low))
         found.append((i, share))
     return found
 

@@ -7,6 +7,7 @@ slack or taut, or a stop begins or ends to push: a root of a tension or of a way
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,8 @@ _EVEN = 1e-9  # a tension below this part of the largest is zero: the load decid
 _TOUCH = 1e-12  # a stop touches at this distance [rad]
 _JUMP = 1e-6  # part of the change of a value within a step that is left where it should be 0
 _CHANGE = 1e-5  # a rate below this part of the largest is rounding
+
+_EPSILON = 2.0**-50  # least relative precision of a root
 
 _LOST = CdsmError("the equilibrium is not found.")
 
@@ -108,6 +111,15 @@ def dip(before: tuple[Array, Array], after: tuple[Array, Array]) -> float | None
     deep = cubic.min(axis=1)
     k = int(deep.argmin())
     return float(parts[k, 0]) if deep[k] < 0.0 else None
+
+
+def root(
+    value: Callable[[float], float], low: float, high: float, xtol: float, rtol: float = _EPSILON
+) -> float:
+    """Return where a quantity is 0 between two places; if rounding hides it, the best place."""
+    from scipy.optimize import brentq  # slow to import
+
+    return float(brentq(value, low, high, xtol=xtol, rtol=rtol, disp=False))
 
 
 def piece_of(model: Model, here: Stage) -> Model:
@@ -217,8 +229,6 @@ def _passed(here: Stage, stage: Stage) -> Flags:
 
 def _end_of_smooth(at: Callable[[float], Stage | None], here: Stage, there: Stage) -> Stage | None:
     """Return ``there``, or the equilibrium where the first value is 0; None if it is lost."""
-    from scipy.optimize import brentq  # slow to import
-
     passed = _passed(here, there)
     if not passed.any():
         return there
@@ -241,7 +251,7 @@ def _end_of_smooth(at: Callable[[float], Stage | None], here: Stage, there: Stag
             if value(first, i) < 0.0:
                 precision = PRECISION * (there.share - here.share)
                 change = abs(before[i] - value(first, i))
-                first = brentq(value, here.share, first, args=(i,), xtol=precision)
+                first = root(partial(value, i=i), here.share, first, precision)
                 if abs(value(first, i)) > _JUMP * change + _EVEN:
                     return None  # the search found another branch on the far side
     except CdsmError:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from cdsm.friction.capstan import can_stick
 from cdsm.statics.events import Event, Kind, Watched, buckling_joint, crossings
 from cdsm.statics.hung_loads import total_force
+from cdsm.statics.pieces import root
 from cdsm.statics.quasi_static import (
     Action,
     ChainArmState,
@@ -181,8 +182,6 @@ class _Walk:
         end: float | None = None,
     ) -> float:
         """Return the share at which a quantity is 0 before ``there``, or ``end``."""
-        from scipy.optimize import brentq  # slow to import
-
         if self._values[i] <= self._none[i]:
             return self._share
 
@@ -198,7 +197,7 @@ class _Walk:
         if value(end) >= 0.0:
             return end
         precision = _PRECISION * (there.share - self._share)
-        return float(brentq(value, self._share, end, xtol=precision))
+        return root(value, self._share, end, precision)
 
     def _first(
         self, found: Callable[[float], _Stage | None], there: _Stage

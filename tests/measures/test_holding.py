@@ -46,6 +46,9 @@ def check_following(seed: int) -> str:
             return cdsm.stiffness(pose, tension).is_stable
         except cdsm.InfeasibleTension:
             return False
+        except cdsm.CdsmError:  # the solver fails where only one set of tensions is left
+            assert force == pytest.approx(held.force, rel=1e-6)
+            return False
 
     assert bisected(holds, held.force) == pytest.approx(held.force, rel=1e-6)
     assert held.events[-1].load == held.force
@@ -74,15 +77,15 @@ def check_locked(seed: int) -> str:
     return held.limit
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, 1, 2, 37])
 def test_bisections_find_what_an_arm_holds(seed: int) -> None:
     assert "cable" in check_following(seed)
     assert check_locked(seed)
 
 
 @pytest.mark.long
-def test_bisections_find_what_thirty_arms_hold() -> None:
-    for seed in range(30):
+def test_bisections_find_what_sixty_arms_hold() -> None:
+    for seed in range(60):
         check_following(seed)
         check_locked(seed)
 
