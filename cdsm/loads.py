@@ -37,14 +37,11 @@ def loads_of(arm: Manipulator, wrench: object, name: str = "wrench") -> Applied:
 
     Raises InvalidInput if a link does not exist or is the base, or two loads act at one point.
     """
-    items = loads_in(arm, wrench, name)
+    if isinstance(wrench, Loads):  # of this arm, or of one like it
+        return Loads(tuple(_moved_to(arm, load) for load in wrench.loads))
+    items = loads_in(wrench, name)
     if items is None:
         return wrench_vector(name, wrench)  # type: ignore[arg-type]
-    return applied_by(arm, items, name)
-
-
-def applied_by(arm: Manipulator, items: Sequence[Load], name: str = "wrench") -> Applied:
-    """Return what loads do on an arm; errors are those of :func:`loads_of`."""
     loads: list[TipLoad | PointLoad] = [
         TipLoad(W) if is_tip(arm, at) else PointLoad(at, W)
         for at, W in placed_loads(items, arm.body, arm.definition.geometry, name)
@@ -61,10 +58,8 @@ def is_tip(arm: Manipulator, at: LinkPoint) -> bool:
     return at.link == arm.tip_link and not at.local.any()
 
 
-def loads_in(arm: Manipulator, wrench: object, name: str) -> list[Load] | None:
+def loads_in(wrench: object, name: str) -> list[Load] | None:
     """Return loads as a list; None if they are given as numbers."""
-    if isinstance(wrench, Loads):  # of this arm, or of one like it
-        return [_given(arm, load) for load in wrench.loads]
     if not has_loads(wrench):
         return None
     return [load for load in kept_loads(name, wrench) if isinstance(load, Load)]
@@ -107,9 +102,9 @@ def has_loads(value: object) -> bool:
     return any(isinstance(load, (Load, Loads, Mapping)) for load in several)
 
 
-def _given(arm: Manipulator, load: TipLoad | PointLoad) -> Load:
-    """Return a load as it may be given."""
-    W = load.wrench.tolist()
+def _moved_to(arm: Manipulator, load: TipLoad | PointLoad) -> TipLoad | PointLoad:
+    """Return a load of another arm at the same point of a link of this one."""
     if isinstance(load, TipLoad):
-        return Load(arm.tip_link, tuple(W[:3]), tuple(W[3:]))
-    return Load(load.at.link, tuple(W[:3]), tuple(W[3:]), tuple(load.at.local.tolist()))
+        return load
+    at = point_on(arm.body, arm.definition.geometry, load.at.link, load.at.local)
+    return PointLoad(at, load.wrench)

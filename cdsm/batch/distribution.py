@@ -18,7 +18,7 @@ from cdsm.batch.rows import Rows
 from cdsm.batch.solution import solve_rows
 from cdsm.dead_loads import LinkPoint, Load, placed_loads
 from cdsm.errors import InvalidInput
-from cdsm.loads import is_tip, loads_in
+from cdsm.loads import is_tip, loads_in, loads_of
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import WRENCH, flag, instance, number_array, whole_number
 from cdsm.support.values import Array, frozen
@@ -175,15 +175,18 @@ def check_load_rows(
 
     if isinstance(value, AppliedRows):
         return value
+    if isinstance(value, Loads):
+        at_tip, loads = AppliedRows.of([loads_of(arm, value)])
+        return AppliedRows(frozen(at_tip[0].copy()), loads)
     if isinstance(value, Mapping):
         given = [Load(link) for link in value]
         wrenches = [checked(f"{name}[{link!r}]", W) for link, W in value.items()]
     else:
-        loads = None if value is None else loads_in(arm, value, name)
-        if loads is None:
+        items = None if value is None else loads_in(value, name)
+        if items is None:
             return AppliedRows(checked(name, np.zeros(6) if value is None else value))
-        given = loads
-        wrenches = [load.wrench for load in loads]
+        given = items
+        wrenches = [load.wrench for load in items]
     at_tip = frozen(np.zeros(6))
     points = list[LinkPoint]()
     on_links = list[Array]()

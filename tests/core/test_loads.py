@@ -374,6 +374,25 @@ def test_a_weight_on_a_link_measures_the_stiffness_there(friction: float) -> Non
     np.testing.assert_allclose(history.pose(0).q, test.states[-1].pose.q, atol=1e-5)
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_the_last_disk_of_a_backbone_is_its_tip(friction: float) -> None:
+    """Loads at one place, on two links, are two loads of what goes on from there."""
+    arm = backbone().with_friction(friction)
+    rest = cdsm.forward_statics(arm, tension=[1.0, 0.5, 0.2], wrench=[0.0, 0.01, 0.0, 0, 0, 0])
+    on_disk, at_tip = (
+        cdsm.weight_test(rest.pose, rest, [0.0, 0.0, -0.02], link=link)
+        for link in ("disk10", "tool0")
+    )
+    np.testing.assert_allclose(on_disk.displacements, at_tip.displacements, atol=1e-9)
+    loaded = on_disk.states[-1]
+    K = cdsm.stiffness(loaded.pose, loaded.tension, loaded.applied)
+    np.testing.assert_allclose(K.joint, loaded.stiffness.joint, atol=1e-12)
+    batch = cdsm.evaluate(
+        arm, loaded.pose.q[None], loaded.tension, loaded.applied, ("load",), check_limits=False
+    )
+    np.testing.assert_allclose(batch["load"][0], K.load, atol=1e-12)
+
+
 def test_forward_statics_under_loads_on_disks() -> None:
     arm = backbone()
     F = np.full(len(arm.cables), 0.5)
