@@ -364,14 +364,23 @@ class Manipulator(ComputedArm):
     def with_loads(self, loads: Load | Sequence[Load]) -> Manipulator:
         """Return the same arm with these loads that belong to it, and no others.
 
-        They act wherever the arm does, besides any ``wrench``: such as a gripper or a camera, by
-        its weight. They count in ``K.load``, and move with no gravity: they are dead forces.
+        They act wherever the arm does, besides any ``wrench``: such as the weight of a gripper or
+        a camera. They count in ``K.load``; as dead forces they do not follow ``gravity``.
 
         Args:
             loads: One or more :class:`~cdsm.Load`.
 
         Raises:
             InvalidInput: A link does not exist or is the base, or two loads act at one point.
+
+        Example:
+            >>> import cdsm
+            >>> gripper = cdsm.Load("link5", force=(0.0, -2.0, 0.0))
+            >>> arm = cdsm.presets.virtual_prototype()
+            >>> poses = [a.at([0.1] * 10) for a in (arm, arm.with_loads(gripper))]
+            >>> F = [cdsm.distribute_tension(pose, minimum=5.0).values for pose in poses]
+            >>> [round(float(each.max()), 2) for each in F]
+            [33.13, 35.69]
         """
         return self.replace(loads=[loads] if isinstance(loads, Load) else loads)
 
