@@ -367,11 +367,15 @@ def plot_weight_test(test: WeightTest, ax: Axes | None = None, *, title: str | N
         words = f"linear: {stiffness_text(test.tangent, digits=3)}"
         look: dict[str, Any] = {"fontsize": 7, "color": style.SOFT, "ha": "right", "va": "bottom"}
         look |= {"xytext": (-4, 1), "textcoords": "offset points"}
-        panel.annotate(words, (0.93 * end, 0.93 * end * slope), **look)
+        part = 0.93
+        if test.history is not None:  # the curve with friction is above
+            part = 0.6
+            look |= {"ha": "left", "va": "top", "xytext": (4, -2)}
+        panel.annotate(words, (part * end, part * end * slope), **look)
     if test.history is not None:
         panel.plot(smooth, loads, color=style.SKY, lw=0.9, gid="frictionless", label="no friction")
         panel.plot([], [], color=style.BLUE, lw=1.4, label="with friction")
-        panel.legend(loc="lower right")
+        panel.legend(loc="upper left")
     at_events = np.array([event.load for event in test.events])
     bends = MM * test.event_displacements @ u
     order = np.argsort(np.append(loads, at_events), kind="stable")
@@ -492,7 +496,8 @@ def _draw_events(panel: Axes, events: Sequence[_Mark], lowest: bool = False) -> 
     least = 0.08 * (high - low)
     wanted = np.array([event.y for event in named]) - 0.1 * (high - low)
     wanted = np.full(len(named), low) if lowest else wanted
-    places = style.move_apart(wanted, least, low + 0.06 * (high - low), high - 0.1 * (high - low))
+    ends = low + 0.1 * (high - low), high - 0.1 * (high - low)
+    places = style.move_apart(np.clip(wanted, *ends), least, *ends)
     rest = len(events) - len(named)
     for event, place in zip(named, places, strict=True):
         text = event.text + (f" (and {rest} more)" if rest and event is named[-1] else "")
