@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib import pyplot
+from matplotlib.animation import PillowWriter
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from PIL import Image
+from scipy.spatial import ConvexHull
 
 import cdsm
 from cdsm import plots
@@ -230,6 +232,11 @@ def test_arms_beside_each_other_have_one_scale() -> None:
         color = artists(ax, "cable:")[f"cable:{name}:0"].get_color()
         np.testing.assert_allclose(to_rgba(color), TENSION_COLORS(share), atol=1e-9)
     assert (first.get_title(loc="left"), second.get_title(loc="left")) == ("a", "b")
+    assert not first.child_axes  # one bar, beside the last
+    (bar,) = second.child_axes
+    np.testing.assert_allclose(bar.get_ylim(), [both.min(), both.max()])
+    assert artists(first, "axis:")
+    assert not artists(second, "axis:")
     soft = short_arm(spring=1500.0, lead=0.5).at(np.full(6, 0.1))
     loose = (soft, None, cdsm.stiffness(soft, cdsm.distribute_tension(soft, 5.0)))
     scales = [
@@ -277,7 +284,15 @@ def test_path_has_the_way_of_the_tip_and_a_film(plan: PathPlan, tmp_path: Path) 
             np.testing.assert_allclose(to_rgba(color), shade, atol=1e-9)
 
 
-def test_the_arm_of_a_film_moves(tmp_path: Path) -> None:
+def test_the_arm_of_a_film_moves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    titles: list[str] = []
+    grab: Any = PillowWriter.grab_frame
+
+    def read(writer: Any, **options: Any) -> None:
+        titles.append(writer.fig.axes[0].get_title(loc="left"))
+        grab(writer, **options)
+
+    monkeypatch.setattr(PillowWriter, "grab_frame", read)
     poses = [POSE.arm.at(share * POSE.q) for share in (-1.0, 0.0, 1.0)]
     plots.plot_path(poses, view=FRONT, animate=tmp_path / "arm.gif")
     with Image.open(tmp_path / "arm.gif") as film:
@@ -288,6 +303,7 @@ def test_the_arm_of_a_film_moves(tmp_path: Path) -> None:
     grey = [abs(frame - 204.0) < 3.0 for frame in frames]  # the links
     moved = [np.mean(one != other) / np.mean(one) for one, other in pairwise(grey)]
     assert min(moved) > 0.5
+    assert titles == [f"{POSE.arm.name}, posture {k} of 2" for k in range(3)]
 
 
 def test_modes_are_drawn_in_their_shapes() -> None:
@@ -307,6 +323,19 @@ def test_modes_are_drawn_in_their_shapes() -> None:
     require_look(ax)
 
 
+def test_deflections_that_grow_are_named_by_their_rate() -> None:
+    loose = short_arm(spring=1500.0, lead=0.5).at(np.zeros(6))
+    modes = cdsm.modes(cdsm.stiffness(loose, cdsm.distribute_tension(loose, 100.0)))
+    ax = modes.plot(view=FRONT)
+    said = [text.get_text() for text in ax.get_legend().get_texts()]
+    rates = [f"grows at {rate:.3g}/s" for rate in modes.growth_rates]
+    assert said == [*rates, *(f"{frequency:.3g} Hz" for frequency in modes.frequencies)][:3]
+    assert rates
+    assert ax.get_title(loc="left").startswith("UNSTABLE")
+    bent = {gid.rpartition(":")[0] for gid in artists(ax, "mode:")}
+    assert bent == {f"mode:{name}" for name in said}
+
+
 def test_forces_within_the_outline_are_those_that_cables_balance() -> None:
     polytope = cdsm.force_polytope(POSE, 10.0, 200.0)
     ax = polytope.plot(view=FRONT)
@@ -316,6 +345,15 @@ def test_forces_within_the_outline_are_those_that_cables_balance() -> None:
     np.testing.assert_allclose(outline.min(axis=0), corners.min(axis=0))
     worst = polytope.radius * polytope.worst_direction[[0, 2]]
     np.testing.assert_allclose(line(ax, "worst"), [[0.0, 0.0], worst], atol=1e-12)
+    np.testing.assert_allclose(line(ax, "no load"), [[0.0, 0.0]])
+    hull = ConvexHull(polytope.vertices).equations
+    (edges,) = artists(ax, "edges").values()
+    assert edges.get_segments()
+    for segment in edges.get_segments():  # each is one of a face towards the eye, in −y
+        ends = [abs(corners - end).sum(axis=1).argmin() for end in segment]
+        np.testing.assert_allclose(corners[ends], segment)
+        off = abs(polytope.vertices[ends] @ hull[:, :3].T + hull[:, 3]).max(axis=0)
+        assert hull[off < 1e-6 * np.ptp(corners), 1].min() < 0.0
     require_all([(numbers(words(ax), "red: {} in the worst direction")[0], polytope.radius)])
     (length,) = numbers(words(ax), "axes {}")
     assert length.unit == "N"

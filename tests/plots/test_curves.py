@@ -6,13 +6,21 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex, to_rgba
+from matplotlib.figure import Figure
 
 import cdsm
 from cdsm import plots
 from cdsm.plots.curves import _MARKS
-from cdsm.plots.style import DARK, TERM_COLORS, VERMILLION, move_apart, round_numbers
+from cdsm.plots.style import (
+    DARK,
+    TERM_COLORS,
+    VERMILLION,
+    cable_lines,
+    move_apart,
+    round_numbers,
+)
 from tests.support.arms import mixed_arm, random_posture
-from tests.support.pictures import artists, colors_of, line, named, require_look, words
+from tests.support.pictures import artists, colors_of, labels, line, named, require_look, words
 from tests.support.printed import numbers, require_all
 from tests.support.sweeps import short_arm
 
@@ -111,6 +119,14 @@ def test_curve_of_a_sweep_has_a_scale_for_each_direction() -> None:
         assert ax.get_xlabel() == "least tension of all cables [N]"
         assert ax.get_ylabel() == f"stiffness along {u} [N/mm]"
     require_look(axs)
+
+
+def test_curve_of_a_sweep_stands_at_the_least_bound_that_any_cable_has() -> None:
+    first, *rest = POSE.arm.cables
+    arm = POSE.arm.with_cables([replace(first, minimum=30.0), *rest])
+    dataset = cdsm.sweep(arm, [POSE.q], minimum=[10.0, 40.0], progress=False)
+    for ax, u in zip(plots.plot_tension_curve(dataset), "xyz", strict=True):
+        np.testing.assert_allclose(line(ax, f"curve:{u}")[:, 0], [10.0, 40.0])
 
 
 def test_weight_goes_up_with_the_displacement_and_events_stand_at_their_loads(
@@ -266,6 +282,10 @@ def test_bars_of_tensions_are_tensions_between_their_bounds() -> None:
     capped = cdsm.distribute_tension(POSE, 10.0, most).plot()
     np.testing.assert_allclose(line(capped, "bound:maximum")[:, 0], most)
     np.testing.assert_allclose(line(capped, "bound:minimum")[:, 0], 10.0)
+    assert labels(capped) == {
+        "bound:minimum": "least that is allowed",
+        "bound:maximum": "most that is allowed",
+    }
     with pytest.raises(cdsm.InvalidInput, match="breaking: -5 N given"):
         PULL.plot(breaking=-5.0)
 
@@ -277,7 +297,7 @@ def test_plans_stand_between_the_softest_and_the_stiffest_arm() -> None:
         np.testing.assert_allclose(line(ax, "softest")[:, 0], reach.low_tension.values)
         np.testing.assert_allclose(line(ax, "stiffest")[:, 0], reach.high_tension.values)
         for name, value in (("softest", reach.low), ("stiffest", reach.high)):
-            require_all([(numbers(words(ax), f"{name}: {{}}")[0], value)])
+            require_all([(numbers(labels(ax)[name], f"{name}: {{}}")[0], value)])
         assert ax.get_xlabel() == "tension [N]"
         require_look(ax)
     between = artists(reach.plot(), "between")["between"].get_segments()
@@ -285,6 +305,7 @@ def test_plans_stand_between_the_softest_and_the_stiffest_arm() -> None:
     np.testing.assert_allclose(ends, np.c_[reach.low_tension.values, reach.high_tension.values])
     require_all([(numbers(words(plan.plot()), "which tensions give {}")[0], plan.achieved)])
     missed = replace(plan, target=2.0 * np.asarray(plan.target))
+    require_all([(numbers(words(missed.plot()), "which tensions give {}")[0], plan.achieved)])
     require_all([(numbers(words(missed.plot()), "missed by {}")[0], missed.misfit)], digits=2)
     bars = artists(plan.plot(), "tension:").values()
     np.testing.assert_allclose([bar.get_width() for bar in bars], plan.tension.values)
@@ -311,6 +332,14 @@ def test_critical_load_is_marked_at_its_factor() -> None:
     assert capped.limit == "infeasible"
     assert f"no balance at {capped.factor:.4g} times" in words(capped.plot())
     require_look(ax)
+
+
+def test_names_of_cables_stand_in_the_order_of_their_last_tensions() -> None:
+    values = np.array([[1.0, 9.0, 5.0], [9.0, 1.0, 6.0], [8.0, 2.0, np.nan]])
+    ax = Figure(figsize=(3.0, 3.0)).subplots()
+    cable_lines(ax, np.arange(3.0), values, ["falls", "rises", "ends"][::-1])
+    heights = {name: named(ax)[name].xy[1] for name in ("ends", "rises", "falls")}
+    np.testing.assert_allclose([*heights.values()], [8.0, 2.0, 6.0], atol=0.5)
 
 
 def test_names_move_apart_in_their_order_and_ticks_are_round() -> None:

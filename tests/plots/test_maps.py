@@ -108,6 +108,22 @@ def test_bins_are_medians_by_hand() -> None:
     assert maps.bin_values(points, values, edges, "max")[0, 0] == 9.0
 
 
+def test_a_cell_without_a_value_has_the_hatch_of_most_of_its_postures() -> None:
+    unstable, lost = int(cdsm.Status.UNSTABLE), int(cdsm.Status.INFEASIBLE)
+    points = np.array([[0.5, 0.5]] * 3 + [[1.5, 0.5]] * 4)
+    status = np.array([unstable, lost, unstable, lost, lost, unstable, 0])
+    values = np.where(status == 0, 1.0, np.nan)
+    edges = np.arange(3.0), np.arange(2.0)
+    cells = maps.bin_values(points, values, edges, "median")
+    faults = maps._binned_faults(points, values, status, edges, cells)
+    assert {words: mask.tolist() for words, mask in faults.items()} == {
+        "unstable": [[True, False]],
+        "no balance": [[False, False]],  # the other cell has a value
+    }
+    faults = maps._binned_faults(points[:6], values[:6], status[:6], edges, cells * np.nan)
+    assert faults["no balance"].tolist() == [[False, True]]
+
+
 def test_wide_ranges_have_logarithmic_colours() -> None:
     for values, logarithmic in (
         (np.linspace(1.0, 7.0, 50), False),
@@ -162,6 +178,13 @@ def test_a_path_is_a_curve_over_the_way() -> None:
     assert ax.get_xlabel() == "way along the path [°]"
     assert " ".join(ax.get_ylabel().split()) == "stiffness in the softest direction [N/mm]"
     require_look(ax)
+    gap = dataset.copy(deep=True)
+    gap.softest.loc[{"pose": gap["pose"][2]}] = np.nan
+    (ax,) = plots.plot_map(gap)
+    (span,) = artists(ax, "no value").values()  # halfway to the postures beside it
+    ends = np.rad2deg(dataset.distance.values[1:4])
+    assert span.get_x() == pytest.approx((ends[0] + ends[1]) / 2.0)
+    assert span.get_x() + span.get_width() == pytest.approx((ends[1] + ends[2]) / 2.0)
 
 
 @pytest.mark.parametrize(

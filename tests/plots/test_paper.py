@@ -97,6 +97,13 @@ def test_stiffness_over_tension_ends_where_the_paper_says() -> None:
         first = result.curves[0].pseudoinverse[0, i]
         assert end[0, 1] == pytest.approx(1e-3 * first * (1.0 + result.claims[0].paper[i]))
         assert axs[3 + i].get_xlabel() == TENSION
+        (curve,) = result.curves
+        for row, definition in enumerate(DEFINITIONS):
+            (bars,) = axs[3 * row + i].containers
+            values = 1e-3 * getattr(curve, definition)[:, i]
+            for (left, y), (right, _) in bars[2][0].get_segments():
+                at = abs(values - y).argmin()
+                np.testing.assert_allclose([left, right], curve.tension[at, [0, 2]])
 
 
 def test_postures_stand_over_their_curves() -> None:

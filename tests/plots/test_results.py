@@ -20,7 +20,7 @@ from cdsm.support.values import Plotted
 from tests.design import test_problem as designs
 from tests.identification import test_experiment as experiment
 from tests.identification import test_search as identified
-from tests.support.pictures import artists, line, named, require_look, words
+from tests.support.pictures import artists, labels, line, named, require_look, words
 from tests.support.printed import numbers, require_all
 from tests.support.sweeps import short_arm
 from tests.support.tracking import small_path
@@ -115,7 +115,13 @@ def test_fit_of_a_tensile_test_is_drawn_over_it() -> None:
     assert (left.get_xlabel(), left.get_ylabel()) == ("strain [%]", "force [N]")
     assert (right.get_xlabel(), right.get_ylabel()) == ("tension [N]", "tangent rigidity EA [kN]")
     require_all([(numbers(words(axs), "wire of {}")[0], fit.test.gauge_length)])
+    assert labels(left) == {"test": "test", "fit": "fit"}
+    assert labels(right) == {"band": "95 % band", "rigidity": "EA"}
     require_look(axs)
+    zero = np.r_[-1e-3, np.linspace(0.0, 5e-3, 50)] + 2e-3  # mounted with a loose wire
+    loose = cdsm.fit_tensile_test(zero, np.r_[0.0, np.linspace(0.0, 480.0, 50)], 0.5)
+    fitted = line(loose.plot()[0], "fit").T[::-1]
+    assert np.interp(240.0, *fitted) == pytest.approx(0.9, rel=0.05)
 
 
 @pytest.mark.parametrize("along", ["x", "y"])
@@ -138,6 +144,7 @@ def test_law_of_a_wire_is_drawn_in_kilonewtons() -> None:
     np.testing.assert_allclose(EA, 1e-3 * np.asarray(STRAND.rigidity(F)))
     np.testing.assert_allclose(line(ax, "secant")[:, 1], 1e-3 * STRAND.secant_rigidity(F))
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("tension [N]", "rigidity EA [kN]")
+    assert labels(ax) == {"tangent": "tangent, dF/dε", "secant": "secant"}
     require_look(ax)
 
 
@@ -221,7 +228,10 @@ def test_bars_of_a_budget_are_its_sources(budget: Any) -> None:
 def test_intervals_of_monte_carlo_stand_where_they_are(budget: Any) -> None:
     run = cdsm.monte_carlo(*_uncertain(), direction="z", draws=2000, progress=False)
     ax = run.plot()
-    _, size = budget.measurand.unit
+    unit, size = budget.measurand.unit
+    assert ax.get_xlabel() == f"{budget.name} [{unit}]"
+    assert ax.get_ylabel() == f"probability density [1/({unit})]"
+    assert labels(ax) == {"histogram": "Monte Carlo", "first order": "first order"}
     for name, interval in (("Monte Carlo", run.interval()), ("first order", budget.interval())):
         ends = [
             float(mark.get_xdata()[0]) for mark in ax.lines if mark.get_gid() == f"interval:{name}"
@@ -253,7 +263,14 @@ def test_planned_tests_have_their_counts_and_intervals() -> None:
     assert heights == plan.counts.tolist()
     assert left.get_xlabel() == "95 % interval, ± [% of the expected value]"
     assert f"{plan.counts.sum()} tests chosen" in words(axs)
+    assert (right.get_xlabel(), right.get_ylabel()) == ("candidate", "tests")
+    assert not left.texts
     require_look(axs)
+    blind = [J * ([0.0] + [1.0] * (J.shape[1] - 1)) for J in plan.jacobians]
+    left, _ = replace(plan, jacobians=tuple(blind)).plot()
+    (missing,) = left.texts
+    assert missing.get_text().strip() == "not determined"
+    assert missing.get_position()[1] == left.get_yticks()[0]  # in the row of the first parameter
 
 
 def test_designs_have_their_objectives_and_the_compromise_a_ring() -> None:

@@ -172,6 +172,9 @@ def test_the_picture_shows_points_law_and_what_the_scale_decides() -> None:
     np.testing.assert_allclose(drawn["law"].get_ydata(), fit.law.torque(x))
     np.testing.assert_allclose(drawn["tangent"].get_ydata(), fit.law.stiffness(x))
     assert drawn["first point"].get_xdata()[0] == pytest.approx(5.0)
+    (x0, M0), (x1, M1) = drawn["linear"].get_xydata()
+    (best,) = np.linalg.lstsq(fit.angle[:, None], fit.torque)[0]
+    assert (M1 - M0) / np.deg2rad(x1 - x0) == pytest.approx(best)
     (band,) = right.collections
     heights = band.get_paths()[0].vertices[:, 1]
     assert heights.max() == pytest.approx(fit.stiffness_range[0], rel=1e-6)

@@ -33,6 +33,12 @@ def line(ax: Axes, gid: str) -> Array:
     return np.asarray(artists(ax, gid)[gid].get_xydata(), dtype=float)
 
 
+def labels(ax: Axes) -> dict[str, str]:
+    """What the legend of a panel says of each artist, by gid."""
+    handles, said = ax.get_legend_handles_labels()
+    return {str(artist.get_gid()): label for artist, label in zip(handles, said, strict=True)}
+
+
 def words(picture: Any) -> str:
     """All texts of the panels of a picture, and of its figure, a line each; − is -."""
     figure = figure_of(picture)

@@ -16,6 +16,7 @@ UNITS: Final = {
 
 _NUMBER = r"([-+]?\d[\d.]*(?:e[-+]?\d+)?|[-+]?inf|nan|-)"
 _UNIT = r"(N m/rad|N/mm|N/m|N m|N s/m|N|kg|mm|µm|mJ|ms|m|°|%|Hz|σ)"
+_FOREIGN = r"\.?\d| ?[kMGmcµ]?(?:N|m|g|Pa|J|rad)\b"  # goes on, or has a unit that is not known
 _GAP = "  "
 
 
@@ -67,6 +68,7 @@ def numbers(text: str, sentence: str, unit: str = "") -> list[Printed]:
     """
     pattern = re.escape(" ".join(sentence.split()))
     pattern = pattern.replace(r"\{\}", f"{_NUMBER}(?: ?{_UNIT}(?![A-Za-z/]))?")
+    pattern += f"(?![0-9])(?!{_FOREIGN})" * sentence.endswith("{}")
     found = re.search(pattern, "\n".join(" ".join(line.split()) for line in text.splitlines()))
     assert found is not None, f"{sentence!r} is not in\n{text}"
     pairs = zip(found.groups()[::2], found.groups()[1::2], strict=True)

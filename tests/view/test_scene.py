@@ -13,6 +13,7 @@ from cdsm.view import serve
 from cdsm.view.live_view import View
 from tests.core.test_posture import ring
 from tests.support import foreign
+from tests.support.printed import numbers, require_all
 from tests.view import scene
 from tests.view.test_state import DEGREES, STABLE, soft_arm
 
@@ -94,6 +95,27 @@ def test_the_ellipsoid_is_where_forces_of_one_newton_move_the_tip(view: View) ->
     force = np.linalg.solve(K.compliance[:3, :3], moved.T)
     np.testing.assert_allclose(np.linalg.norm(force, axis=0), 1.0, rtol=1e-3)
     assert f"scale {drawn.scale:g}:1" in str(drawn)
+    a, b, c = np.moveaxis(surface[scene.node(view, "/ellipsoid").faces], 1, 0)
+    outwards = (a + b + c) / 3.0 - K.posture.tip[:3, 3]
+    # only the front of a triangle is seen; those at the poles have no area
+    assert (np.sum(np.cross(b - a, c - a) * outwards, axis=1) > -1e-12).all()
+
+
+def test_axes_stand_at_the_base_and_the_arm_above_a_grid_of_the_size_that_is_written(
+    view: View,
+) -> None:
+    for axis, name in zip(np.eye(3), "xyz", strict=True):
+        label = scene.node(view, f"/base/{name}")
+        assert label.text == name
+        place = np.array(label.position)
+        np.testing.assert_allclose(place / np.linalg.norm(place), axis, atol=1e-9)
+    grid = scene.node(view, "/grid")
+    lowest = min(scene.cable(view, name)[0][:, 2].min() for name in view.arm.cables.names)
+    assert grid.position[2] < lowest
+    written = numbers(view._panel._answer.content, "grid: {}")
+    require_all([(written[0], grid.cell_size)])
+    assert grid.section_size == pytest.approx(5.0 * grid.cell_size)
+    assert written[0].unit == "mm"
 
 
 def test_the_arrow_is_the_force_where_it_acts(view: View) -> None:
@@ -173,6 +195,9 @@ def test_an_arm_without_balance_is_grey_and_says_so(view: View) -> None:
         label = scene.label(view)
         assert label is not None
         assert label[0] == view.shown.heading == "INFEASIBLE"
+        across, along, above = label[1] - view.arm.at(np.deg2rad(DEGREES)).tip[:3, 3]
+        np.testing.assert_allclose([across, along], 0.0, atol=SINGLE)
+        assert above > 0.0
         assert {scene.cable(view, name)[1] for name in view.arm.cables.names} == {(150, 150, 150)}
         assert scene.ellipsoid(view) is None
     finally:
