@@ -74,6 +74,11 @@ def require_place(text: str, answer: Answer) -> None:
     line = next(line for line in text.splitlines() if line.startswith("at "))
     angles = [numbers(each, "{}")[0] for each in line[3:].partition(";")[0].split(", ")]
     require_all(zip(angles, answer["angles_rad"].values(), strict=True))
+    assumed = answer["computed_with"]
+    gravity = numbers(text, "gravity {}, {}, {} m/s²")
+    require_all(zip(gravity, assumed["gravity_m_per_s2"], strict=True), digits=6)
+    assert f"with wire {assumed['wire']}; " in text
+    assert f"; friction {assumed['friction']}\n" in text
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from tests.support.printed import numbers, require_all, table
+from tests.support.printed import Printed, numbers, require_all, table
 from tests.support.sweeps import short_arm
 
 POSE = short_arm(cdsm.presets.STRAND_1X19, lead=0.3).at(np.full(6, 0.1))
@@ -84,6 +84,29 @@ def test_budget_and_monte_carlo() -> None:
     ends = numbers(str(run), "95 % of the draws: {} to {}", "N/mm")
     for end, exact in zip(ends, (low, high), strict=True):
         assert float(end.text) * end.size == pytest.approx(exact, rel=1e-3)
+
+
+def test_terms_of_a_stiffness_are_its_shares_by_name() -> None:
+    rows = table(str(K), "stiffness [N")
+    for axis in "xyz":
+        shares = K.shares(axis)
+        parts = {"passive": shares.passive.sum(), "active": shares.active.sum(), **shares.others}
+        said = {name: parts[name] for name in parts if f"of it {name}" in rows}
+        assert {"passive", "active", "gravity"} <= {*said}
+        require_all((rows[f"of it {name}"][axis], value) for name, value in said.items())
+
+
+def test_bars_of_shares_are_printed_with_their_parts_and_percents() -> None:
+    shares = K.shares("z")
+    rows = table(str(shares), "cable ")
+    assert [*rows] == [*shares, *shares.others, "total"]
+    for name, passive, active in zip(shares, shares.passive, shares.active, strict=True):
+        cells = rows[name]
+        printed = (Printed(cells[part].text, "N/mm") for part in ("passive", "active", "sum"))
+        require_all(zip(printed, (passive, active, passive + active), strict=True))
+        share = (passive + active) / shares.total
+        assert cells["share"].text == f"{100.0 * share:z.1f}%"
+    require_all([(rows["total"]["sum"], shares.total)])
 
 
 def test_weakest_joint_of_a_stiffness_is_named() -> None:
