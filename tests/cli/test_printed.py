@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from scipy.special import chdtr, ndtri
 
+import cdsm
 from tests.cli.test_commands import EXAMPLES, call
 from tests.support.printed import Printed, numbers, require_all, table
 
@@ -95,6 +96,17 @@ def test_stiffness(words: str) -> None:
     require_place(text, answer)
     require_tensions(text, answer["tension_N"])
     require_stiffness(text, answer)
+    arm = cdsm.Manipulator.read(EXAMPLES / f"{words.split()[0].lower()}.toml")
+    J = arm.at([*answer["angles_rad"].values()]).jacobian
+    rows = table(text, "stiffness [N")
+    for i, axis in enumerate("xyz"):
+        if answer["along_N_per_m"][i] is not None:  # each term is mᵀ K m of the same motion m
+            motion = np.linalg.solve(answer["joint_stiffness_Nm_per_rad"], J[i])
+            motion /= J[i] @ motion
+            for name in ("passive", "active", "gravity", "load"):
+                part = motion @ answer[f"{name}_Nm_per_rad"] @ motion
+                cell = rows[f"of it {name}"][axis]
+                assert float(cell.text) * cell.size == pytest.approx(part, rel=1e-3, abs=1e-6)
     held = answer["computed_with"]["least_tension_N"]
     assert [{*low.values()} for low in held] == [{float(numbers(text, "least tension {}")[0].text)}]
 
@@ -155,8 +167,13 @@ def test_weigh(words: str) -> None:
     require_held(text, "locked", answer["holds"])
     if "friction" not in words:  # else the table is that without friction, and says so
         last = answer["tensions_N"][-1]
-        cells = (cells["tension"] for cells in table(text, "cable ").values())
-        require_all(zip(cells, last, strict=True), digits=None)
+        cables = table(text, "cable ")
+        pairs = zip((cells["tension"] for cells in cables.values()), last, strict=True)
+        require_all(pairs, digits=None)
+        _, start = both("stiffness ARM --angles 8")  # from where the weight pulls
+        require_all(
+            ((cables[name]["reference"], F) for name, F in start["tension_N"].items()), digits=None
+        )
         return
     assert "at the full load without friction:\n" in text
     stuck = numbers(text, "below {} all cables stick: a weight measures {}")
