@@ -2,13 +2,16 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import cdsm
 from tests.estimation.test_loads import TIP, held, readme
+from tests.identification.test_tip_position import compared
 from tests.support.printed import Printed, numbers, require_all, table
 from tests.support.sweeps import short_arm
+from tests.support.tracking import small_path
 
 POSE = short_arm(cdsm.presets.STRAND_1X19, lead=0.3).at(np.full(6, 0.1))
 PULL = cdsm.distribute_tension(POSE, 40.0)
@@ -143,3 +146,29 @@ def test_wraps_have_their_angles_in_degrees() -> None:
         if touches:
             shown = fleet[np.isfinite(fleet)]
             require_all(zip((Printed(x, "°") for x in sides), shown, strict=True), digits=None)
+
+
+def test_explanations_say_which_of_them_explain() -> None:
+    found: Any = compared()
+    rows = table(str(found), "free ")
+    assert [*rows] == ["nothing", *found.names]
+    for name, fit, explains in zip(found.names, found.alone, found.explains, strict=True):
+        cells = rows[name]
+        require_all([(cells["χ²"], fit.chi_square)])
+        assert cells["explains"].text == ("yes" if explains else "no")
+        off = np.sqrt(np.mean((fit.predicted - fit.measured) ** 2))
+        require_all([(Printed(cells["RMSE"].text, "mm"), off)], digits=3)
+    assert rows["nothing"]["explains"].text == "no"
+
+
+def test_a_closed_loop_has_its_errors_and_the_ends_of_its_tensions() -> None:
+    run = cdsm.track(small_path(0.1), steps=2, minimum=10.0, maximum=250.0)
+    text = str(run)
+    error = numbers(text, "tip error, mean and largest {}, {} mm", "mm")
+    require_all(zip(error, (run.tip_error.mean(), run.tip_error.max()), strict=True), digits=3)
+    ends = numbers(text, "true tensions at the motors {} to {}", "N")
+    require_all(zip(ends, (run.tension.min(), run.tension.max()), strict=True))
+    off = abs(run.stiffness_error)
+    share = numbers(text, "stiffness error, mean and largest {}, {} %", "%")
+    require_all(zip(share, (np.nanmean(off), np.nanmax(off)), strict=True), digits=3)
+    require_all([(numbers(text, "smallest joint stiffness {}")[0], np.nanmin(run.margin))])
