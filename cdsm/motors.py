@@ -15,10 +15,12 @@ from typing import Literal, final, get_args
 import numpy as np
 
 from cdsm.cable import Cable, Cables
-from cdsm.errors import CdsmError, InvalidInput, listed
+from cdsm.errors import CdsmError, InvalidInput, listed, warn
 from cdsm.support.format import aligned, plural
 from cdsm.support.validation import (
+    WIDEST,
     check_numbers,
+    doubts_about_units,
     number,
     one_of,
     scalar,
@@ -77,6 +79,12 @@ class Motor:
             self.__dict__["cables"] = _checked_radii(self.cables)
         except CdsmError as error:
             raise InvalidInput(f"motor {self.name!r}", str(error)) from None
+        drums = [
+            (f"the drum of {cable} on motor {self.name!r}", abs(radius), WIDEST)
+            for cable, radius in self.cables.items()
+        ]
+        for doubt in doubts_about_units(0.0, drums):
+            warn(doubt)
 
     def __hash__(self) -> int:
         return hash((self.name, self.stiffness, self.control, *self.cables.items()))

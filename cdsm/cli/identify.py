@@ -18,6 +18,7 @@ import cdsm
 from cdsm.cli import options
 from cdsm.cli.options import FigureOption, JsonOption, file_opt, opt
 from cdsm.cli.output import answer, misuse, write, write_picture
+from cdsm.support.validation import SMALLEST
 
 if TYPE_CHECKING:
     from cdsm.identification import Identification
@@ -106,6 +107,11 @@ def _fit_spring(
     from cdsm.springs.fit import SCALE
 
     angles, torques = cdsm.read_spring_csv(test)
+    if scale is not None and scale < math.degrees(SMALLEST):
+        raise misuse("--scale", f"{scale:g} given; a positive angle [deg] is needed.")
+    if not limits[0] < limits[1]:
+        problem = f"{limits[0]:g},{limits[1]:g} given; LOW is below HIGH"
+        raise misuse("--between", f"{problem}, both in degrees.")
     a = SCALE if scale is None else math.radians(scale)
     ends = math.radians(limits[0]), math.radians(limits[1])
     fitted = cdsm.fit_spring(angles, torques, scale=a, between=ends)

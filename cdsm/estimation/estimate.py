@@ -216,7 +216,8 @@ def checked_readings(
     if tension_std is None:
         largest = float(read.max(initial=0.0))
         if largest <= 0.0:
-            raise InvalidInput("tension_std", "all readings are 0 N; give that of the load cells.")
+            problem = f"1 % of the largest reading, {largest:g} N, tells nothing; give that of the"
+            raise InvalidInput("tension_std", f"{problem} load cells, and check their signs.")
         tension_std = _ASSUMED * largest
     std = _spread("tension_std", tension_std, cables, "force", "a load cell is not exact")
     angle = _spread("angle_std", angle_std, arm.joint_names, None, "")

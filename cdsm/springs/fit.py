@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, warn
-from cdsm.springs.law import SpringLaw
+from cdsm.springs.law import SpringLaw, checked_scale
 from cdsm.support.format import plural, span
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.tables import ANGLE, Columns
-from cdsm.support.validation import doubts_about_angle, number_array, scalar
+from cdsm.support.validation import doubts_about_angle, number_array
 from cdsm.support.values import Array, Plotted, frozen
 
 SCALE: Final = math.radians(2.0)
@@ -24,6 +24,7 @@ SCALE: Final = math.radians(2.0)
 _FEWEST = 3  # points that tell two parameters and a scatter
 _FLATTEST = 0.02  # exponent at which torques do not rise
 _STEEP = 2.0  # a last chord that is so many times the steepest before it is a stop
+_ALIKE = 1e10  # condition of the normal equations beyond which k and p are not told apart
 _TURN = 2.0 * math.pi
 _TORQUES: Final = {"N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "N mm": 1e-3, "Nmm": 1e-3}
 
@@ -142,7 +143,7 @@ def fit_spring(
     """
     x = number_array("angles", angles)
     y = number_array("torques", torques)
-    a = scalar("scale", scale)
+    a = checked_scale(scale)
     if x.ndim != 1 or x.shape != y.shape:
         raise InvalidInput("torques", f"shapes {x.shape} and {y.shape} given; a point has both.")
     limits = np.asarray(between)
@@ -209,8 +210,16 @@ def _fitted(x: Array, y: Array, scale: float, linear: float) -> tuple[Array, Arr
             "do not rise with the angle: no spring law fits them. Look at the points in order."
         )
         raise InvalidInput("torques", problem)
+    normal = found.jac.T @ found.jac
+    if np.linalg.cond(normal) > _ALIKE:
+        spread = span(np.rad2deg(abs(x)), "{:.4g}°".format)
+        problem = (
+            f"of {spread} from rest tell no exponent with the scale {math.degrees(scale):.3g}°"
+        )
+        remedy = "measure small and large angles, and give a scale near the smallest of them."
+        raise InvalidInput("angles", f"{problem}; {remedy}")
     scatter = float(found.fun @ found.fun) / (x.size - 2)
-    return np.asarray(found.x), np.asarray(np.linalg.inv(found.jac.T @ found.jac) * scatter)
+    return np.asarray(found.x), np.asarray(np.linalg.inv(normal) * scatter)
 
 
 def _of_scale(scale: float, x: Array, others: tuple[SpringLaw, SpringLaw]) -> str:

@@ -83,9 +83,7 @@ class SpringLaw:
         if not 0.0 < p <= _STEEPEST:
             problem = f"{p:g} given; a number above 0, up to {_STEEPEST:g}, is needed: with 0 or "
             raise InvalidInput("exponent", f"{problem}less, the torque does not rise.")
-        a = scalar("scale", scale)
-        if a < SMALLEST:
-            raise InvalidInput("scale", f"{a:g} given; a positive angle [rad] is needed.")
+        a = checked_scale(scale)
         for doubt in doubts_about_angle("the scale of a spring is", a, _WIDEST):
             warn(doubt)
         return SpringLaw(Power(k, p, a), scalar("angle", angle))
@@ -242,6 +240,14 @@ class SpringLaw:
 _NAMES: Final[dict[type, str]] = {Power: "power", TorqueTable: "table", Given: "function"}
 _NEAR = 1e-3  # an angle [rad] near rest, whose torque the torque at rest is compared with
 _AT_REST = 1e-9
+
+
+def checked_scale(scale: object) -> float:
+    """Return the scale a [rad] of a power law; InvalidInput if it is no positive angle."""
+    a = scalar("scale", scale)
+    if a < SMALLEST:
+        raise InvalidInput("scale", f"{a:g} given; a positive angle [rad] is needed.")
+    return a
 
 
 def _require_rising(name: str, values: Array, angles: Array) -> None:

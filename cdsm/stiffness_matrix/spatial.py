@@ -69,7 +69,7 @@ def transform(pose: Posture, frame: str, at: str | ArrayLike) -> tuple[Array, Ar
         R = placements[one_of("frame", frame, ("base", *placements))][:3, :3].T
     if isinstance(at, str):
         names = ("tip", *placements)
-        point = tip if at == "tip" else placements[one_of("at", at, names)][:3, 3]
+        point = tip if at == "tip" else placements[one_of("link for at=", at, names)][:3, 3]
     else:
         point = vector("at", at, 3, "a point (3,) [m] in base axes, or the name of a link")
     x, y, z = point - tip

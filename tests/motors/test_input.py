@@ -12,6 +12,12 @@ from tests.support.motors import spooled
 ARM = spooled().with_motors([])
 PAIR = {"cable1_1": 0.012, "cable1_2": -0.012}
 
+
+def test_a_drum_in_millimetres_is_doubted() -> None:
+    with pytest.warns(cdsm.CdsmWarning, match=r"the drum of cable1_1 on motor 'm' is 12 m: it loo"):
+        cdsm.Motor("m", {"cable1_1": 12.0, "cable1_2": -0.012})
+
+
 ALONE: dict[str, tuple[dict[str, Any], str]] = {
     "no cables": ({"cables": {}}, "motor 'm': cables: none given; a motor moves one cable or more"),
     "a list": ({"cables": ["cable1_1"]}, r"give a dict of radii \[m\] by cable"),

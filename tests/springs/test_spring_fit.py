@@ -154,12 +154,30 @@ def test_the_command_fits_draws_and_refuses(tmp_path: Path) -> None:
         ("--gauge-length", "50", "a spring has none"),
         ("--columns", "a,b", "call the columns angle"),
         ("--units", "deg,N m", "in the header"),
+        ("--scale", "0", "--scale: 0 given; a positive angle [deg] is needed"),
+        ("--scale", "-2", "--scale: -2 given; a positive angle [deg] is needed"),
+        ("--between", "30,10", "--between: 30,10 given; LOW is below HIGH, both in degrees"),
     ):
         refused = run("--spring", str(SPRING), option, value)
         assert refused.exit_code == 2
         assert said in " ".join(refused.output.split())
     assert "belongs to --spring" in run(str(SPRING), "--scale", "1").output
     assert "Give --spring" in " ".join(run(str(SPRING)).output.split())
+
+
+@pytest.mark.parametrize("scale", [0.0, -0.1])
+def test_a_scale_that_is_no_angle_is_refused(scale: float) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=r"scale: .* given; a positive angle \[rad\] is"):
+        cdsm.fit_spring([0.1, 0.2, 0.3], [0.10, 0.18, 0.25], scale=scale)
+
+
+@pytest.mark.parametrize(
+    ("angles", "scale"), [([0.1, 0.1, 0.1], 0.035), ([0.1, 0.2, 0.3, 0.4], 1e5)]
+)
+def test_points_that_tell_no_exponent_are_refused(angles: list[float], scale: float) -> None:
+    torques = 0.9 * np.asarray(angles)
+    with pytest.raises(cdsm.InvalidInput, match=r"angles: of .*° from rest tell no exponent with"):
+        cdsm.fit_spring(angles, torques, scale=scale)
 
 
 def test_the_picture_shows_points_law_and_what_the_scale_decides() -> None:
