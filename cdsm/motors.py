@@ -326,13 +326,14 @@ YIELDING_REMEDY = (
 )
 
 
-def refuse_shared(motors: Motors, what: str, remedy: str = "") -> None:
+def refuse_shared(motors: Motors, what: str, remedy: str = "", values: str = "tensions") -> None:
     """Raise InvalidInput if motors move several cables, so that tensions are not free.
 
-    ``what`` cannot work then; ``remedy`` is what works, where the user stands.
+    ``what`` cannot work then; ``remedy`` is what works, where the user stands; ``values`` is what
+    is not free of each cable.
     """
     if not motors.are_free:
-        free = f"tensions of {len(motors.matrix)} cables are not free: "
+        free = f"{values} of {len(motors.matrix)} cables are not free: "
         works = remedy or (
             "Use distribute_tension(pose, assembly=) or forward_statics(motors=, assembly=), "
             "or, in Python, with_motors([]) for an arm with a motor for each cable."

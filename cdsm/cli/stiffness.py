@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -73,8 +74,10 @@ def show_stiffness(
     sure, uncertainty = _uncertainty(K.distribution, axes)
     if check or out is not None:
         report = (rest or K).report()
-        about = f"{arm}\n{head}\ncdsm {cdsm.__version__}"
-        write(out, lambda file: report.write(file, about, direction and axes[direction]))
+        changed = " ".join(f"--set {shlex.quote(change)}" for change in changes or ())
+        about = f"{arm} {changed}".rstrip() + f"\n{head}\ncdsm {cdsm.__version__}"
+        source = options.python_of(arm, changes)
+        write(out, lambda file: report.write(file, about, direction and axes[direction], source))
         failed = () if report.passed else (f"{report.outcome}: the report says why.",)
         output = numbers | report.to_dict() | uncertainty
         return answer(as_json, output, head, report, *lines, *sure, warnings=failed)
@@ -128,12 +131,17 @@ def _sticking(
     tension: cdsm.Tension | None, axes: dict[str, Sequence[float]]
 ) -> tuple[list[str], Json]:
     """Return the stuck stiffness and the load of the first slip, as text and for JSON, if any."""
+    from cdsm.motors import refuse_rough
     from cdsm.support.format import stiffness_text
 
     lines = list[str]()
     numbers = Json()
     if tension is None or not tension.posture.arm.has_friction:
         return [], {}
+    try:
+        refuse_rough(tension.posture.arm.motors, True, "friction")
+    except cdsm.InvalidInput as error:  # else the reader would think that nothing sticks
+        return [f"what small loads measure is not told: {error}"], {"sticking": str(error)}
     for name, u in axes.items():
         with contextlib.suppress(cdsm.CdsmError):
             first = cdsm.breakaway(tension.posture, tension, u)

@@ -68,12 +68,15 @@ pre{overflow:auto;font-size:12px}
 _NAMESPACE: Final = re.compile(r' xmlns(:\w+)?="[^"]*"')  # which HTML knows without a name
 _REFERENCE: Final = re.compile(r'(\bid="|\burl\(#|\bhref="#)')
 _NO_METADATA: Final = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+_SOURCE: Final = 'cdsm.Manipulator.read("ARM.toml")'
 _CURVE_LEVELS: Final = 60
 _REACH: Final = 8.0  # the curve goes on to at most this multiple of the least tension here
 _BEYOND: Final = 1.25  # and to at least this one
 
 
-def draw_report(report: Report, about: str = "", direction: Direction | None = None) -> str:
+def draw_report(
+    report: Report, about: str = "", direction: Direction | None = None, source: str = ""
+) -> str:
     """Return the page of a report; see :meth:`~cdsm.stiffness_matrix.Report.to_html`."""
     K = report.stiffness
     arm = K.posture.arm
@@ -109,7 +112,7 @@ def draw_report(report: Report, about: str = "", direction: Direction | None = N
 <div class="two">{"".join(sections)}</div>
 {_folded(_count(report), "".join(_table(*rows) for rows in tables(report)))}
 {_folded("Compliance of the tip", _compliance(K))}
-{_folded("The same in Python", f"<pre>{_escape(_python(K))}</pre>")}
+{_folded("The same in Python", f"<pre>{_escape(_python(K, source))}</pre>")}
 {_paragraph(report.model, "soft lines")}
 </body></html>
 """
@@ -261,8 +264,8 @@ def _compliance(K: Stiffness) -> str:
     return _table(("[mm/N], base axes", "force x", "force y", "force z"), *cells)
 
 
-def _python(K: Stiffness) -> str:
-    """Return lines of Python that compute the stiffness again."""
+def _python(K: Stiffness, source: str) -> str:
+    """Return lines of Python that compute the stiffness again, of the arm that ``source`` gives."""
     pose = K.posture
     wrench = f", wrench={K.tip_wrench.tolist()}" if K.tip_wrench.any() else ""
     loads = ""
@@ -280,7 +283,7 @@ def _python(K: Stiffness) -> str:
         pull = f"cdsm.distribute_tension(pose, minimum={low}{high}{wrench})"
     return (
         "import cdsm\n\n"
-        'arm = cdsm.Manipulator.read("ARM.toml")\n'
+        f"arm = {source or _SOURCE}\n"
         f"pose = arm.at({pose.q.tolist()})\n{loads}"
         f"K = cdsm.stiffness(pose, {pull})\n"
         'K.report().write("REPORT.html")'

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from cdsm.cable import serpentine_cables
 from cdsm.geometry import CableRoute, Geometry, Joint, Link
 from cdsm.manipulator import Manipulator
+from cdsm.support.validation import scalar
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity
 
@@ -168,6 +169,8 @@ def silicone_tentacle(
         >>> (1e3 * rest.pose.tip[:3, 3]).round(1).tolist()
         [334.9, 82.7, 47.7]
     """
+    density = scalar("density", density)
+    youngs_modulus = scalar("youngs_modulus", youngs_modulus)
     turn, end = _CONE
     to_turn = np.linspace(0.0, turn, _GAPS[0] + 1)
     places = np.concatenate([to_turn, np.linspace(turn, end, _GAPS[1] + 1)[1:]]).tolist()

@@ -94,7 +94,7 @@ def forward_statics(
         friction: Whether friction in the holes counts. False: where the arm rests without it.
 
     Raises:
-        InvalidInput: Not exactly one of the three is given, an argument has the wrong shape, or a
+        InvalidInput: Not exactly one of the four is given, an argument has the wrong shape, or a
             cable does not exist; or motors hold lengths, but a cable has the control ``"force"``;
             or ``start`` is given with friction.
         ElasticityRangeError: Motors hold lengths, and a tension is outside the domain of its law.
@@ -282,6 +282,9 @@ def _model(
         if motor.control == "torque":
             problem = f"{motor.name} holds a torque, no length: give motors=, with its torque."
             raise InvalidInput(name, problem)
+    if name == "pull":
+        remedy = "Give motors=, how far they turn [rad]: a drum that takes in one cable moves all."
+        refuse_shared(arm.motors, "pull", remedy, "lengths")
     least = np.array([cable.elasticity.rest for cable in arm.cables])
     straight = arm.laws.original_lengths(home.cable_lengths, least)
     if name == "pull":

@@ -158,27 +158,34 @@ class Report(Result):
         lever = f"Sliding joints count with the arm's length, {arm.length:.4g} m, as lever."
         return f"{sentence}\n{lever}"
 
-    def to_html(self, about: str = "", direction: Direction | None = None) -> str:
+    def to_html(self, about: str = "", direction: Direction | None = None, source: str = "") -> str:
         """Return the report as a self-contained HTML page with pictures, without scripts.
 
         Args:
             about: Text below the title.
             direction: Direction of shares, curve and uncertainty: an axis such as ``"z"``, or (3,)
                 in base axes, any length; None: the softest of x, y and z.
+            source: Python that gives the arm, for the lines that compute all this again. Default:
+                ``cdsm.Manipulator.read("ARM.toml")``, a file that the reader has to write.
 
         Raises:
             InvalidInput: The direction is invalid.
         """
-        page: str = draw("draw_report", self, about=about, direction=direction)
+        page: str = draw("draw_report", self, about=about, direction=direction, source=source)
         return page
 
     def write(
-        self, path: str | os.PathLike[str], about: str = "", direction: Direction | None = None
+        self,
+        path: str | os.PathLike[str],
+        about: str = "",
+        direction: Direction | None = None,
+        source: str = "",
     ) -> Path:
         """Write the report; return the path.
 
         The file is a page (``.html``, :meth:`to_html`), text (``.txt``), or the numbers as a table
-        (``.csv``) or Dataset (``.nc``). ``about`` is text below the title of page and text.
+        (``.csv``) or Dataset (``.nc``). ``about`` is text below the title of page and text,
+        ``source`` as in :meth:`to_html`.
 
         Raises:
             InvalidInput: The path has another ending, or the direction is invalid.
@@ -187,7 +194,7 @@ class Report(Result):
         """
         suffix = as_path(path).suffix.lower()
         if suffix == ".html":
-            return write_text(path, self.to_html(about, direction))
+            return write_text(path, self.to_html(about, direction, source))
         if suffix == ".txt":
             return write_text(path, f"{_text(self, about)}\n")
         if suffix not in (".csv", ".nc"):

@@ -52,3 +52,9 @@ def test_files_keep_them(build: type[cdsm.Manipulator], tmp_path: Path) -> None:
     tension = np.linspace(1.0, 2.0, len(arm.cables))
     one, other = (cdsm.stiffness(each.at(q), tension) for each in (arm, again))
     np.testing.assert_allclose(other.joint, one.joint, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["density", "youngs_modulus"])
+def test_numbers_of_the_tentacle_are_numbers(name: str) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=f"{name}: holds <U1 entries, such as 'a'; real"):
+        presets.silicone_tentacle(**{name: "a"})  # type: ignore[arg-type]

@@ -270,6 +270,10 @@ def test_bad_commands_and_assemblies_are_named() -> None:
             "pull: m1b holds a torque, no length: give motors=, with its torque",
         ),
         (
+            lambda: cdsm.forward_statics(spooled(), pull={"cable1_1": 1e-3}),
+            "pull: lengths of 12 cables are not free: 8 motors move them. Give motors=, how far",
+        ),
+        (
             lambda: cdsm.forward_statics(arm, tension=np.ones(12)),
             "tension: tensions of 12 cables are not free: 8 motors move them. Give motors=",
         ),

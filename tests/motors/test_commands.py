@@ -89,3 +89,10 @@ def test_results_survive_pickling() -> None:
         assert str(again) == str(result)
         assert again.to_dict() == result.to_dict()
     assert not pull.commands.flags.writeable
+
+
+def test_small_loads_are_not_passed_over_where_motors_yield(path: Path) -> None:
+    words = ("stiffness", path, "--angles", 5, "--set", "friction=0.1")
+    text = " ".join(call(*words).output.split())
+    assert "what small loads measure is not told: friction: m1 yields: friction in the" in text
+    assert "m1 yields" in told(*words)["sticking"]

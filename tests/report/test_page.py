@@ -2,6 +2,7 @@
 
 import html
 import re
+import shutil
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -14,6 +15,7 @@ import cdsm
 from cdsm.plots import page
 from cdsm.plots.page import draw_curve
 from cdsm.stiffness_matrix import Report
+from tests.cli.test_commands import call
 from tests.support import arms, locked
 from tests.support.pictures import artists
 from tests.support.printed import Printed, numbers, require_all
@@ -249,3 +251,21 @@ def test_the_pictures_of_the_page_are_those_of_its_stiffness(
     np.testing.assert_array_equal(tension, K.tension)
     assert drawn["plot_tensions"][0] is K.distribution
     assert drawn["plot_uncertainty"][0].value == pytest.approx(K.along(u))
+
+
+def test_the_python_of_a_page_computes_the_same_with_what_was_set(tmp_path: Path) -> None:
+    shutil.copy("examples/arm.toml", tmp_path / "my arm.toml")
+    page = tmp_path / "R.html"
+    words = ["stiffness", str(tmp_path / "my arm.toml"), "--angles", "5", "--out", str(page)]
+    words += ["--set", "minimum=60", "--set", "gravity=-y", "--mass", "0.2@link3"]
+    assert call(*words).exit_code == 0
+    text = html.unescape(page.read_text(encoding="utf-8"))
+    assert "my arm.toml --set minimum=60 --set gravity=-y" in text
+    program = text.partition("<pre>")[2].partition("</pre>")[0]
+    names: dict[str, Any] = {}
+    exec(program.partition("K.report()")[0], names)
+    arm = cdsm.Manipulator.read("examples/arm.toml", changes={"minimum": 60.0, "gravity": "-y"})
+    pose = arm.at(np.full(arm.nv, np.deg2rad(5.0)))
+    load = cdsm.Load("link3", force=(0.0, -0.2 * 9.81, 0.0))
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, wrench=[load]))
+    np.testing.assert_allclose(names["K"].joint, K.joint, rtol=1e-9)
