@@ -18,7 +18,6 @@ import cdsm
 from cdsm.cli import options
 from cdsm.cli.options import FigureOption, JsonOption, file_opt, opt
 from cdsm.cli.output import answer, misuse, write, write_picture
-from cdsm.support.validation import SMALLEST
 
 if TYPE_CHECKING:
     from cdsm.identification import Identification
@@ -105,6 +104,7 @@ def _fit_spring(
 ) -> int:
     """Fit the law of a spring; ``scale`` and ``limits`` are in degrees."""
     from cdsm.springs.fit import SCALE
+    from cdsm.support.validation import SMALLEST
 
     angles, torques = cdsm.read_spring_csv(test)
     if scale is not None and scale < math.degrees(SMALLEST):
