@@ -66,6 +66,9 @@ def test_an_estimate_has_what_friction_hides_before_the_combined_deviation() -> 
     ):
         printed = (Printed(cells[name].text, unit) for name in ("friction ±", "combined std"))
         require_all(zip(printed, (band, u), strict=True), digits=2)
+    for cells, load in zip(rows.values(), found.loads, strict=True):
+        value = cells["value ± std"].text.partition(" ± ")[0]
+        require_all([(Printed(value, ""), load)], digits=None)
 
 
 def test_a_band_is_half_its_width_to_each_side() -> None:

@@ -324,7 +324,7 @@ def test_modes_are_drawn_in_their_shapes() -> None:
 
 
 def test_deflections_that_grow_are_named_by_their_rate() -> None:
-    loose = short_arm(spring=1500.0, lead=0.5).at(np.zeros(6))
+    loose = short_arm(spring=1500.0, lead=0.5).at(np.array([0.1, 0.0, 0.08, 0.0, 0.05, 0.02]))
     modes = cdsm.modes(cdsm.stiffness(loose, cdsm.distribute_tension(loose, 100.0)))
     ax = modes.plot(view=FRONT)
     said = [text.get_text() for text in ax.get_legend().get_texts()]
@@ -334,6 +334,16 @@ def test_deflections_that_grow_are_named_by_their_rate() -> None:
     assert ax.get_title(loc="left").startswith("UNSTABLE")
     bent = {gid.rpartition(":")[0] for gid in artists(ax, "mode:")}
     assert bent == {f"mode:{name}" for name in said}
+    told = []
+    for name, shape in zip(rates[:3], modes.growth_shapes.T, strict=False):
+        near = loose.arm.at(loose.q + 1e-4 * shape, check_limits=False).bones
+        up = np.array([new[1, 2] - old[1, 2] for new, old in zip(near, loose.bones, strict=True)])
+        drawn = [line(ax, f"mode:{name}:{k}")[1, 1] for k in range(len(loose.bones))]
+        if said.count(name) == 1:  # others are drawn under the same name
+            flat = [1e3 * bone[1, 2] for bone in loose.bones]
+            assert np.corrcoef(up, np.subtract(drawn, flat))[0, 1] > 0.9
+            told.append(name)
+    assert told
 
 
 def test_forces_within_the_outline_are_those_that_cables_balance() -> None:
