@@ -13,14 +13,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, warn
 from cdsm.routing import cross
+from cdsm.support.format import coordinates
 from cdsm.support.validation import one_of, vector
 from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
     from cdsm.geometry import Geometry
     from cdsm.rigid_body import RigidBody
+
+_STILL = 1e-9  # of the length of the arm: a point that moves by less per radian stands still
 
 
 @final
@@ -78,6 +81,7 @@ class LinkPoint:
     row: int  # of the joint that carries the link, among placements
     offset: Array  # (3,) [m] in the frame of this joint
     joints: NDArray[np.intp]  # from the base to this joint, by their numbers
+    still: bool = False  # it lies on the axes of all these joints, in every posture
 
     @cached_property
     def key(self) -> tuple[int, bytes]:
@@ -136,7 +140,20 @@ def _point_on(body: RigidBody, link: str, local: tuple[float, ...]) -> LinkPoint
             "link", f"{link!r} is the base: no joint moves it, and no load bends it."
         )
     offset = frozen(np.asarray(translation + rotation @ local))
-    return LinkPoint(link, frozen(np.array(local)), row, offset, joints)
+    # a point that one posture leaves on all axes is on them in every posture
+    state = body.state(np.zeros(len(body.joint_units)))
+    position = state.placement[row][:3, :3] @ offset + state.placement[row][:3, 3]
+    v, z = np.split(state.twist[:, joints], 2)
+    still = bool(abs(v + cross(z, position[:, None])).max() < _STILL * body.length)
+    return LinkPoint(link, frozen(np.array(local)), row, offset, joints, still)
+
+
+def doubt_still(at: LinkPoint) -> None:
+    """Warn of a point that no joint moves, such as the centre of the first joint."""
+    if at.still:
+        where = f"no joint moves the point {coordinates(1e3 * at.local)} mm of {at.link}"
+        remedy = "give point= (in ARM.toml: point), or, on the command line, a link farther out."
+        warn(f"{where}: a force there bends nothing; {remedy}")
 
 
 class Places(NamedTuple):
@@ -170,5 +187,7 @@ def placed_loads(
             raise InvalidInput(f"{name}.{error.name}", problem) from None
         if at.key in places:
             raise InvalidInput(name, f"two loads act on {load.link} at one point; add them up.")
+        if load.wrench[:3].any():
+            doubt_still(at)
         places[at.key] = at, load.wrench
     return tuple(places.values())

@@ -22,6 +22,7 @@ def described(arm: ComputedArm, applied: Applied) -> list[dict[str, object]]:
             "force_N": W[:3],
             "moment_Nm": W[3:],
             **({"of_the_arm": True} if own else {}),
+            **({"moved_by_no_joint": True} if at.still and W[:3].any() else {}),
         }
         for own, at, W in _on_links(arm, applied)
     ]
@@ -39,7 +40,8 @@ def texts(arm: ComputedArm, applied: Applied) -> list[str]:
     for own, at, W in _on_links(arm, applied):
         parts = [f"{coordinates(W[:3])} N"] * bool(W[:3].any())
         parts += [f"{coordinates(W[3:])} N m"] * bool(W[3:].any())
-        where = f"{coordinates(1e3 * at.local)} mm in its frame"
+        still = ", which no joint moves" if at.still and W[:3].any() else ""
+        where = f"{coordinates(1e3 * at.local)} mm in its frame{still}"
         whose = "load of the arm" if own else "load"
         lines.append(f"{whose} on {at.link}, {where}: {', '.join(parts) or 'none'}")
     return lines

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.applied import Applied, Loads, PointLoad, TipLoad
-from cdsm.dead_loads import LinkPoint, Load, placed_loads, point_on
+from cdsm.dead_loads import LinkPoint, Load, doubt_still, placed_loads, point_on
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import one_of, wrench_vector
@@ -29,7 +29,9 @@ def link_point(arm: Manipulator, link: object, point: ArrayLike | None = None) -
         return None
     if point is None and one_of("link", link, arm.body.link_names) == arm.tip_link:
         return None
-    return point_on(arm.body, arm.definition.geometry, link, point)
+    at = point_on(arm.body, arm.definition.geometry, link, point)
+    doubt_still(at)
+    return at
 
 
 def loads_of(arm: Manipulator, wrench: object, name: str = "wrench") -> Applied:
