@@ -298,13 +298,14 @@ ASKED: dict[str, Callable[[Case, Path], None]] = {
 }
 
 Refusal = tuple[str, frozenset[str], str]
-_FREE = r"tensions of \d+ cables are not free: \d+ motors move them\. \w"
+_FREE = r"(?:tensions|lengths) of \d+ cables are not free: \d+ motors move them\. \w"
 _ROUGH = "pair yields: friction in the holes would couple all cables that it moves. Take friction 0"
 REFUSED: list[Refusal] = [
     *(
         (asked, frozenset([motors]), _FREE)
         for asked in (
             "rest under held tensions",
+            "rest under pulls",
             "least tensions of a batch",
             "plan",
             "payload",
