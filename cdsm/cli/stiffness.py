@@ -159,7 +159,7 @@ def _uncertainty(
     tension: cdsm.Tension | None, axes: dict[str, Sequence[float]]
 ) -> tuple[list[str], Json]:
     """Return the uncertainty along each axis in which the tip can move, as a table and for JSON."""
-    from cdsm.support.format import aligned
+    from cdsm.support.format import aligned, stiffness_unit, with_uncertainty
     from cdsm.tolerancing.budget import known_tolerances
 
     budgets: dict[str, Uncertainty] = {}
@@ -179,9 +179,11 @@ def _uncertainty(
         ]
 
     sources = {source for budget in budgets.values() for source in budget.contributions}
+    unit, size = stiffness_unit(*(budget.value for budget in budgets.values()))
+    shown = [with_uncertainty(x.value, x.standard_uncertainty, size) for x in budgets.values()]
     rows = [
-        ("uncertainty [N/mm]", *budgets),
-        ("along", *(budget.shown for budget in budgets.values())),
+        (f"uncertainty [{unit}]", *budgets),
+        ("along", *shown),
         *(
             (f"  {source.replace('_', ' ')}", *(f"{part:.2g} %" for part in percent(source)))
             for source in sorted(sources, key=lambda source: -max(percent(source)))

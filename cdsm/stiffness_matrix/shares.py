@@ -9,7 +9,7 @@ from typing import final
 import numpy as np
 
 from cdsm.posture import Posture
-from cdsm.support.format import aligned, coordinates, without_rounding
+from cdsm.support.format import aligned, coordinates, stiffness_unit, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, IndexedByName, Plotted, frozen
@@ -91,10 +91,11 @@ class Shares(Result, IndexedByName, Plotted):
         names = [*self.keys(), *others, "total"]
         whole = without_rounding(np.array([*self.cables, *others.values(), self.total]))
         pairs = zip(names, whole, strict=True)
-        rows = [[name, "", "", f"{k / 1e3:z.4g}", f"{k / self.total:z.1%}"] for name, k in pairs]
+        unit, size = stiffness_unit(whole)
+        rows = [[name, "", "", f"{k / size:z.4g}", f"{k / self.total:z.1%}"] for name, k in pairs]
         for row, passive, active in zip(rows, self.passive, self.active, strict=False):
-            row[1:3] = f"{passive / 1e3:z.4g}", f"{active / 1e3:z.4g}"
-        rows = [["cable", "passive", "active", "sum [N/mm]", "share"], *rows]
+            row[1:3] = f"{passive / size:z.4g}", f"{active / size:z.4g}"
+        rows = [["cable", "passive", "active", f"sum [{unit}]", "share"], *rows]
         warnings = [f"{warning}; its shares mean nothing" for warning in self.warnings]
         along = f"stiffness along {coordinates(self.direction)}"
         return "\n".join([*warnings, along, *aligned(rows), f"({self.model})"])

@@ -6,7 +6,7 @@ Arms with errors are rows of a batch (:mod:`cdsm.batch.solution`), each with its
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,11 +19,11 @@ from cdsm.errors import InvalidInput
 from cdsm.loads import LoadsLike
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.quantities import QUANTITIES, Quantity, display_of, require_name
+from cdsm.quantities import QUANTITIES, Quantity, display_for, require_name
 from cdsm.routing import Indices
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.format import JointUnits, coordinates
+from cdsm.support.format import JointUnits, coordinates, largest_finite
 from cdsm.support.validation import Direction, flag, one_of, unit_direction
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.tension import Tension, distribute_tension
@@ -54,10 +54,10 @@ class Measurand(ReadOnlyState):
         """Inputs of the arm."""
         return inputs_of(self.stiffness.posture.arm)
 
-    @property
+    @cached_property
     def unit(self) -> tuple[str, float]:
         """Unit in which people read the value, and its size in SI."""
-        return self.quantity.shown or display_of(self.si_unit)
+        return self.quantity.shown or display_for(self.si_unit, largest_finite(self.value()))
 
     @property
     def quantity(self) -> Quantity:
