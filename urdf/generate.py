@@ -14,16 +14,16 @@ from tempfile import TemporaryDirectory
 
 import cdsm
 from cdsm import paper, presets
-from cdsm.presets.bodies import AXES, Body, Point, chain
+from cdsm.presets.bodies import JOINT_AXES, SerialBody, Triple, chain
 
 FOLDER = Path(__file__).parent
-X, Y, Z = AXES
+X, Y, Z = JOINT_AXES
 WIRE = cdsm.LinearElasticity(48e3)  # EA [N] of a steel strand of 1.2 mm; CASPR's do not stretch
-Route = Sequence[tuple[str, Point]]  # sites of a cable: link and point
+Route = Sequence[tuple[str, Triple]]  # sites of a cable: link and point
 
 
 def arm_of(
-    name: str, bodies: Sequence[Body], tip: Point, routes: Sequence[Route], **bounds: float
+    name: str, bodies: Sequence[SerialBody], tip: Triple, routes: Sequence[Route], **bounds: float
 ) -> cdsm.Manipulator:
     """Build an arm from bodies in series and the routes of its cables."""
     cables = [
@@ -36,9 +36,9 @@ def arm_of(
 def carex() -> cdsm.Manipulator:
     """Build the exoskeleton of Mao and Agrawal (2012): shoulder and elbow, 6 cables."""
     centre, inertia = (0.0, 0.0, -0.13), (0.0225, 0.0225, 1e-4)
-    upper = Body("upper_arm", (0.0, 0.0, 0.0), (X, Y, Z), 3.1416, 3.0, centre, inertia)
+    upper = SerialBody("upper_arm", (0.0, 0.0, 0.0), (X, Y, Z), 3.1416, 3.0, centre, inertia)
     centre, inertia = (0.0, 0.0, -0.12), (0.0131, 0.0131, 1e-4)
-    fore = Body("forearm", (0.0, 0.0, -0.3), (Y,), 3.1416, 2.0, centre, inertia)
+    fore = SerialBody("forearm", (0.0, 0.0, -0.3), (Y,), 3.1416, 2.0, centre, inertia)
     front, back, side = (0.2, 0.0, 0.0), (-0.2, 0.0, 0.0), (0.1732, 0.0, 0.1)
     routes: list[Route] = [
         [("base", front), ("upper_arm", (0.065, 0.0, -0.26)), ("forearm", (0.06, 0.0, -0.24))],
@@ -54,8 +54,8 @@ def carex() -> cdsm.Manipulator:
 def myo_shoulder() -> cdsm.Manipulator:
     """Build the shoulder of the robot of Richter et al. (2016): 3 joints in one point, 9 cables."""
     zero, ones = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-    upper = Body("upper_arm", zero, (X, Y, Z), 3.1416, 1.0, (0.0, 0.0, -0.225), ones)
-    ends: list[tuple[Point, Point]] = [
+    upper = SerialBody("upper_arm", zero, (X, Y, Z), 3.1416, 1.0, (0.0, 0.0, -0.225), ones)
+    ends: list[tuple[Triple, Triple]] = [
         ((-0.06, 0.045, -0.1), (-0.015, 0.015, -0.045)),
         ((-0.06, 0.08, -0.05), (0.015, 0.015, -0.03)),
         ((-0.06, 0.082, 0.01), (0.015, 0.025, -0.175)),
@@ -73,10 +73,10 @@ def myo_shoulder() -> cdsm.Manipulator:
 def bm_arm() -> cdsm.Manipulator:
     """Build the BM-Arm of CASPR: shoulder and elbow, 6 cables; the straight arm points along y."""
     centre, inertia = (6.11879e-5, 0.142722, 9.20007e-5), (0.0217208, 2.0494929e-4, 0.0217454)
-    upper = Body("upper_arm", (0.0, 0.0, 0.0), (X, Y, Z), 1.0, 0.9810187, centre, inertia)
+    upper = SerialBody("upper_arm", (0.0, 0.0, 0.0), (X, Y, Z), 1.0, 0.9810187, centre, inertia)
     centre, inertia = (0.0, 0.0801433, 0.0), (4.9116366e-4, 1.9877175e-5, 4.9029819e-4)
-    lower = Body("lower_arm", (0.0, 0.367, 0.0), (X,), 1.0, 0.1313765, centre, inertia)
-    ends: list[tuple[Point, str, Point]] = [
+    lower = SerialBody("lower_arm", (0.0, 0.367, 0.0), (X,), 1.0, 0.1313765, centre, inertia)
+    ends: list[tuple[Triple, str, Triple]] = [
         ((-0.106066, 0.021, -0.106066), "upper_arm", (-0.0248764, 0.2195, 1.8743851e-4)),
         ((-0.106066, 0.021, 0.106066), "upper_arm", (-0.0248764, 0.2545, 1.8743851e-4)),
         ((0.106066, 0.021, -0.106066), "upper_arm", (0.025124, 0.2195, 1.8743851e-4)),

@@ -106,15 +106,8 @@ def track(
         >>> arm = cdsm.presets.virtual_prototype()
         >>> plan = cdsm.plan_path(arm, "z", 2500.0, 5.0, 200.0, angles=[[0.08] * 10, [0.1] * 10])
         >>> run = cdsm.track(plan, law="stiffness", minimum=5.0, maximum=200.0, steps=2)
-        >>> print(run)
-        law stiffness: 3 steps, completed
-        tip error, mean and largest                              0.00409, 0.00499 mm
-        frictionless stiffness error, mean and largest               0.0839, 0.169 %
-        true tensions at the motors                                 4.953 to 33.37 N
-        smallest joint stiffness                                       2.929 N m/rad
-        motors clamped at a tension bound               cable1_2, cable2_2, cable3_2
-        rigidity of the wires, as estimated                                  99.99 %
-        inside the first-order band                                  no step has one
+        >>> run.outcome.word, f"the tip is at most {1e6 * run.tip_error.max():.0f} µm off"
+        ('ok', 'the tip is at most 5 µm off')
     """
     arm = instance("plan", plan, PathPlan).arm
     refuse_shared(arm.motors, "plan")

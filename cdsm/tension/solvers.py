@@ -42,7 +42,13 @@ NO_ARM: Final = 1e-15  # moment arms below this part of the arm's length are rou
 _SETTINGS: Final[dict[str, dict[str, Any]]] = {
     "clarabel": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
     "daqp": {"primal_tol": 1e-10, "eq_reduction": 1},
-    "osqp": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 100_000, "polish": False},
+    "osqp": {
+        "eps_abs": 1e-9,
+        "eps_rel": 1e-9,
+        "max_iter": 100_000,
+        "polish": False,
+        "adaptive_rho_interval": 25,  # by default it depends on the time that the machine takes
+    },
 }
 
 
