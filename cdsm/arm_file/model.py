@@ -245,6 +245,8 @@ def _loads(tables: tuple[_OwnLoad, ...]) -> tuple[Load, ...]:
     faults = list[str]()
     loads = list[Load]()
     for i, table in enumerate(tables, start=1):
+        if not any(table.force + table.moment):
+            faults.append(f"[{i}]: gives no force and no moment; 0.2 kg are force = [0, 0, -1.96]")
         try:
             loads.append(Load(**vars(table)))
         except InvalidInput as error:

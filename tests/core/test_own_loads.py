@@ -154,6 +154,7 @@ LOADS = 'loads = [{link = "link2", force = [0, 0, -1]}, {link = "%s", %s}]\n'
         ("link2", "moment = [0, 0, 1]", "loads: two loads act on link2 at one point; add them up"),
         ("link3", "force = [0, 1]", r"loads\[2\]\.force"),
         ("link3", "mass = 0.2", r"loads\[2\]\.mass: is not a key"),
+        ("link3", "point = [0, 0, 0]", r"loads\[2\]: gives no force and no moment"),
         ("link3", "force = [0, 0, 1e12]", r"loads\[2\]\.force: .*1e\+12"),
     ],
 )
