@@ -130,6 +130,16 @@ def test_stiffness_of_directions_with_friction_and_tolerances() -> None:
         for source, part in budget["contributions_N_per_m"].items():
             share = rows[source.replace("_", " ")][name]
             require_all([(share, part / budget["value_N_per_m"])], digits=2)
+    sources = [*rows][1:]
+    largest = {
+        source: max(
+            budget["contributions_N_per_m"][source.replace(" ", "_")] / budget["value_N_per_m"]
+            for budget in answer["uncertainty"].values()
+        )
+        for source in sources
+    }
+    assert sources == sorted(largest, key=lambda source: -largest[source])  # what counts is first
+    assert len({*largest.values()}) > 1
 
 
 def test_stiffness_of_an_arm_whose_motors_hold_tensions() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 import cdsm
 from tests.estimation.test_loads import TIP, held, readme
-from tests.support.pictures import artists, line, require_look
+from tests.support.pictures import artists, line, require_look, rows
 
 
 def test_loads_are_drawn_with_both_uncertainties() -> None:
@@ -20,6 +20,7 @@ def test_loads_are_drawn_with_both_uncertainties() -> None:
         assert np.ptp(line(ax, f"instruments:{name}")[:, 0]) == pytest.approx(3.92 * found.std[i])
         reach = 2.0 * (1.96 * found.std[i] + found.band[i])
         assert np.ptp(line(ax, f"friction:{name}")[:, 0]) == pytest.approx(reach)
+    assert [name for ax in axs for name in rows(ax)] == [*found.names]
     assert [ax.get_xlabel().partition(",")[0] for ax in axs] == ["force [N]", "moment [N m]"]
     require_look(axs)
 

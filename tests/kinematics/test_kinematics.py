@@ -15,6 +15,7 @@ from cdsm.support.values import Array
 from tests.support import foreign
 from tests.support.arms import STEEL, random_arm, readme_geometry
 from tests.support.locked import hinge
+from tests.support.printed import numbers, require_all
 
 DATA = Path(__file__).parents[1] / "data"
 KINDS = ("universal", "hinged", "tree")
@@ -279,6 +280,21 @@ def test_measured_lengths_are_reachable_within_their_error() -> None:
     np.testing.assert_allclose(found.angles, exact.angles, rtol=0.0, atol=1e-6)
     slope = exact.length_error @ exact.posture.length_jacobian  # least squares
     assert abs(slope).max() < 1e-6 * np.linalg.norm(exact.length_error)
+
+
+def test_the_cable_that_is_off_most_is_named_with_its_sign() -> None:
+    arm = random_arm(2, 5)
+    lengths = arm.at(inside(arm, 1, 0.4)).cable_lengths
+    noise = np.random.default_rng(1).normal(0.0, 1e-5, len(arm.cables))
+    signs = set()
+    for sign in (1.0, -1.0):
+        found = cdsm.solve_joint_angles(arm, lengths + sign * noise)
+        worst = int(abs(found.length_error).argmax())
+        name = arm.cables[worst].name
+        off = numbers(str(found), f"{name} is off most, by {{}}")
+        require_all([(off[0], found.length_error[worst])], digits=2)
+        signs |= {np.sign(found.length_error[worst])}
+    assert signs == {1.0, -1.0}
 
 
 # --- bad input and output ------------------------------------------------------------------------

@@ -272,6 +272,14 @@ def test_path_has_the_way_of_the_tip_and_a_film(plan: PathPlan, tmp_path: Path) 
     np.testing.assert_allclose(line(ax, "way"), 1e3 * np.array(tips))
     last = plan.stiffness[-1].posture
     np.testing.assert_allclose(line(ax, "bone:1"), 1e3 * last.bones[1][:, [0, 2]])
+    for k in (0, 1):
+        ghost = line(ax, f"ghost:{k}:1")
+        np.testing.assert_allclose(
+            ghost, 1e3 * plan.stiffness[k].posture.bones[1][:, [0, 2]], rtol=1e-9
+        )
+    shades = [to_rgba(artists(ax, f"{name}:1")[f"{name}:1"].get_color())[0] for name in (
+        "ghost:0", "ghost:1")]  # fmt: skip
+    assert 1.0 > shades[0] > shades[1] > 0.5  # the later, the darker
     require_look(ax)
     with Image.open(tmp_path / "arm.gif") as film:
         assert film.n_frames == 3  # type: ignore[attr-defined]

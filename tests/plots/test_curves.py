@@ -20,7 +20,16 @@ from cdsm.plots.style import (
     round_numbers,
 )
 from tests.support.arms import mixed_arm, random_posture
-from tests.support.pictures import artists, colors_of, labels, line, named, require_look, words
+from tests.support.pictures import (
+    artists,
+    colors_of,
+    labels,
+    line,
+    named,
+    require_look,
+    rows,
+    words,
+)
 from tests.support.printed import numbers, require_all
 from tests.support.sweeps import short_arm
 
@@ -169,6 +178,7 @@ def test_kinds_of_events_are_told_apart_and_names_have_one_colour() -> None:
     markers, colors = zip(*_MARKS.values(), strict=True)
     assert len({*markers}) == len({*colors}) == len(_MARKS)
     assert _MARKS["buckling"] == ("X", VERMILLION)  # what ends the curve is red
+    assert len({*TERM_COLORS.values()}) == len(TERM_COLORS)
     bars = K.shares("z").plot()
     legend = {text.get_text(): key for text, key in zip(
         bars.get_legend().get_texts(), bars.get_legend().get_patches(), strict=True)}  # fmt: skip
@@ -240,6 +250,12 @@ def test_moments_alone_show_where_the_tip_goes(history: Any) -> None:
 SOFT = short_arm(spring=1500.0, lead=0.5).at(np.full(6, 0.1))
 
 
+def pairwise_bars(ax: Any, count: int) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
+    """The ends, in order, of the passive and the active bar of each of the first rows."""
+    ends = [tuple(sorted((bar.get_x(), bar.get_x() + bar.get_width()))) for bar in ax.patches]
+    return [*zip(ends[:count], ends[count : 2 * count], strict=True)]
+
+
 @pytest.mark.parametrize("K", [K, cdsm.stiffness(SOFT, cdsm.distribute_tension(SOFT, 4.0))])
 def test_bars_of_shares_add_up_to_the_stiffness(K: cdsm.Stiffness) -> None:
     """Of the second arm the active part is a third, and negative."""
@@ -250,9 +266,11 @@ def test_bars_of_shares_add_up_to_the_stiffness(K: cdsm.Stiffness) -> None:
     count = len(K.posture.arm.cables)
     np.testing.assert_allclose(widths[:count], 1e-3 * shares.passive)
     np.testing.assert_allclose(widths[count : 2 * count], 1e-3 * shares.active)
-    names = [text.get_text() for text in ax.get_yticklabels()]
-    assert names[:count] == list(K.posture.arm.cables.names)
-    assert ax.get_ylim()[0] > ax.get_ylim()[1]  # first on top
+    assert rows(ax) == [*K.posture.arm.cables.names, *shares.others]
+    for passive, active in pairwise_bars(ax, count):  # none hides a part of the other
+        assert max(passive[0], active[0]) >= min(passive[1], active[1]) - 1e-9
+        assert 0.0 in passive
+        assert {*active} & {0.0, *passive}
     percents = [text.get_text() for text in ax.texts][:count]
     parts = (shares.passive + shares.active) / shares.total
     assert percents == [f"{100.0 * part:z.1f} %" for part in parts]
@@ -273,8 +291,7 @@ def test_bars_of_tensions_are_tensions_between_their_bounds() -> None:
     first = PULL.values[0]
     assert texts[0] == f"{first:.1f} N, {first / 5.0:.0f} %"
     np.testing.assert_allclose(line(ax, "bound:minimum")[:, 0], 10.0)
-    names = [text.get_text() for text in ax.get_yticklabels()]
-    assert names == [*PULL]
+    assert rows(ax) == [*PULL]
     centres = [bar.get_y() + bar.get_height() / 2.0 for bar in artists(ax, "tension:").values()]
     np.testing.assert_allclose(ax.get_yticks(), centres)
     require_look(ax)
@@ -299,6 +316,7 @@ def test_plans_stand_between_the_softest_and_the_stiffest_arm() -> None:
         for name, value in (("softest", reach.low), ("stiffest", reach.high)):
             require_all([(numbers(labels(ax)[name], f"{name}: {{}}")[0], value)])
         assert ax.get_xlabel() == "tension [N]"
+        assert rows(ax) == [*plan.tension]
         require_look(ax)
     between = artists(reach.plot(), "between")["between"].get_segments()
     ends = [segment[:, 0] for segment in between]
@@ -322,7 +340,8 @@ def test_critical_load_is_marked_at_its_factor() -> None:
     critical = cdsm.critical_load(soft, [-2.0, 0.0, 0.0, 0.0, 0.0, 0.0], 5.0)
     ax = critical.plot()
     np.testing.assert_allclose(line(ax, "margin").T, [critical.factors, critical.margins])
-    assert line(ax, "event:end")[0, 0] == critical.factor
+    end = critical.factor, critical.margins[-1]  # where the line ends
+    np.testing.assert_array_equal(line(ax, "event:end"), [end])
     ends = {"buckling": "buckles", "infeasible": "no balance", "elasticity": "end of a law"}
     factor = numbers(words(ax), f"{ends[critical.limit]} at {{}} times the load")
     require_all([(factor[0], critical.factor)])

@@ -20,7 +20,7 @@ from cdsm.support.values import Plotted
 from tests.design import test_problem as designs
 from tests.identification import test_experiment as experiment
 from tests.identification import test_search as identified
-from tests.support.pictures import artists, labels, line, named, require_look, words
+from tests.support.pictures import artists, labels, line, named, require_look, rows, words
 from tests.support.printed import numbers, require_all
 from tests.support.sweeps import short_arm
 from tests.support.tracking import small_path
@@ -215,8 +215,7 @@ def test_bars_of_a_budget_are_its_sources(budget: Any) -> None:
         if u:
             assert bars[f"source:{source.replace('_', ' ')}"].get_width() == pytest.approx(u / size)
     whole = bars["source:all together"].get_width()
-    labels = [f"source:{label.get_text()}" for label in ax.get_yticklabels()]
-    assert labels == [*bars]
+    assert [f"source:{name}" for name in rows(ax)] == [*bars]
     assert whole == pytest.approx(budget.standard_uncertainty / size)
     assert ax.get_xlabel() == f"standard uncertainty [{unit}]"
     require_all([(numbers(words(ax), "= {}: what makes it uncertain")[0], budget.value)])
@@ -258,7 +257,7 @@ def test_planned_tests_have_their_counts_and_intervals() -> None:
     for name, part in zip(plan.names, half, strict=True):
         bar = artists(left, f"interval:{name}")[f"interval:{name}"]
         assert bar.get_width() == pytest.approx(100.0 * part)
-    assert [label.get_text() for label in left.get_yticklabels()] == [*plan.names]
+    assert rows(left) == [*plan.names]
     heights = [bar.get_height() for bar in artists(right, "tests:").values()]
     assert heights == plan.counts.tolist()
     assert left.get_xlabel() == "95 % interval, ± [% of the expected value]"

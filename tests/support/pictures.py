@@ -54,6 +54,13 @@ def named(ax: Axes) -> dict[str, Any]:
     return {text.get_text(): text for text in ax.texts}
 
 
+def rows(ax: Axes) -> list[str]:
+    """The names of the rows of a panel, as they are read: from its top to its bottom."""
+    places = ax.transData.transform([(0.0, y) for y in ax.get_yticks()])[:, 1]
+    names = [text.get_text() for text in ax.get_yticklabels()]
+    return [names[k] for k in np.argsort(-places)]
+
+
 def colors_of(ax: Axes, gid: str) -> tuple[Any, Any]:
     """The colour of the line with this gid, and of its name beside it, as they are drawn."""
     name = gid.rpartition(":")[2]

@@ -134,6 +134,9 @@ def test_the_arrow_is_the_force_where_it_acts(view: View) -> None:
             np.testing.assert_allclose(drawn[0], start, atol=SINGLE)
             length = 0.5 * view.arm.length / 50.0  # of the largest force half the arm
             np.testing.assert_allclose(drawn[1] - drawn[0], [0.0, length, 0.0], atol=SINGLE)
+            (written,) = numbers(view._panel._answer.content, f"force at {link}, {{}} per N")
+            assert written.unit == "mm"
+            require_all([(written, length / (most / 50.0))], digits=3)
     finally:
         view._panel.reset()
 

@@ -189,6 +189,22 @@ def test_the_lines_of_python_compute_what_the_page_shows(friction: float, sag: b
 # --- motors that pull ---------------------------------------------------------------------------
 
 
+def test_the_point_of_a_link_moves_as_the_arm_does() -> None:
+    arm = soft_arm()
+    pose = arm.at(setting(arm).q)
+    shown = show(arm, replace(setting(arm, force=FORCE), sag=True, link="link2"))
+    rest = cdsm.equilibrium(
+        pose,
+        cdsm.distribute_tension(pose, STABLE, 200.0),
+        [cdsm.Load("link2", force=FORCE)],
+    )
+    moved = rest.pose.link_pose("link2")[:3, 3] - pose.link_pose("link2")[:3, 3]
+    assert moved @ FORCE > 1e-4
+    said = numbers(shown)
+    assert said["displacement of link2"] == ", ".join(f"{1e3 * x:z.1f}" for x in moved)
+    assert said["displacement"] == ", ".join(f"{1e3 * x:z.1f}" for x in rest.displacement)
+
+
 def rod() -> cdsm.Manipulator:
     section = {"length": 0.3, "disks": 6, "hole_angles": [0.0, 2.1, 4.2], "hole_radius": 0.01}
     geometry = cdsm.Geometry.backbone(sections=[section], bending_stiffness=0.02)
