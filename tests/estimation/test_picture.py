@@ -21,6 +21,13 @@ def test_loads_are_drawn_with_both_uncertainties() -> None:
         reach = 2.0 * (1.96 * found.std[i] + found.band[i])
         assert np.ptp(line(ax, f"friction:{name}")[:, 0]) == pytest.approx(reach)
     assert [name for ax in axs for name in rows(ax)] == [*found.names]
+    legend = axs[-1].get_legend()
+    widths = {text.get_text(): key.get_linewidth() for text, key in zip(
+        legend.get_texts(), legend.get_lines(), strict=True)}  # fmt: skip
+    drawn = [artists(axs[0], start)[f"{start}{found.names[0]}"].get_linewidth() for start in (
+        "instruments:", "friction:")]  # fmt: skip
+    said = ("load cells, angles: ± 1.96 std", "and what friction hides")
+    assert widths == dict(zip(said, drawn, strict=True))
     assert [ax.get_xlabel().partition(",")[0] for ax in axs] == ["force [N]", "moment [N m]"]
     require_look(axs)
 

@@ -107,7 +107,7 @@ def test_saturation_and_buckling_are_marked_where_they_are() -> None:
     require_look(ax)
     ax = critical.plot()
     np.testing.assert_allclose(line(ax, "margin").T, [critical.bounds, critical.margins])
-    assert line(ax, "event:buckling")[0, 0] == critical.minimum
+    np.testing.assert_array_equal(line(ax, "event:buckling"), [[critical.minimum, 0.0]])
     require_all([(numbers(words(ax), "it buckles from {}")[0], critical.minimum)])
     assert (ax.get_xlabel(), ax.get_ylabel()) == (
         "least tension of all cables [N]", "smallest joint stiffness [N m/rad]"
@@ -199,6 +199,13 @@ def test_weight_with_friction_is_drawn_beside_that_without() -> None:
     drawn = line(ax, "frictionless")
     np.testing.assert_allclose(drawn, np.c_[smooth, [0.0, *test.loads]], atol=1e-12)
     assert (drawn[1:, 0] > line(ax, "test")[1:, 0]).all()  # friction holds it back
+    keys = {text.get_text(): key.get_color() for text, key in zip(
+        ax.get_legend().get_texts(), ax.get_legend().get_lines(), strict=True)}  # fmt: skip
+    assert keys == {
+        "no friction": artists(ax, "frictionless")["frictionless"].get_color(),
+        "with friction": artists(ax, "curve")["curve"].get_color(),
+    }
+    require_look(ax)
 
 
 @pytest.fixture(scope="module")
@@ -313,7 +320,8 @@ def test_plans_stand_between_the_softest_and_the_stiffest_arm() -> None:
     for ax in (plan.plot(reach), reach.plot()):
         np.testing.assert_allclose(line(ax, "softest")[:, 0], reach.low_tension.values)
         np.testing.assert_allclose(line(ax, "stiffest")[:, 0], reach.high_tension.values)
-        for name, value in (("softest", reach.low), ("stiffest", reach.high)):
+        for name, value, marker in (("softest", reach.low, "v"), ("stiffest", reach.high, "^")):
+            assert artists(ax, name)[name].get_marker() == marker  # told apart without colours
             require_all([(numbers(labels(ax)[name], f"{name}: {{}}")[0], value)])
         assert ax.get_xlabel() == "tension [N]"
         assert rows(ax) == [*plan.tension]

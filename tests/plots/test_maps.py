@@ -124,6 +124,12 @@ def test_a_cell_without_a_value_has_the_hatch_of_most_of_its_postures() -> None:
     assert faults["no balance"].tolist() == [[False, True]]
 
 
+def test_reasons_for_no_value_are_told_apart_by_their_hatches() -> None:
+    looks = [*maps._FAULTS.values(), maps._OTHER]
+    for part in zip(*((face, hatch) for _, face, hatch, _ in looks), strict=True):
+        assert len({*part}) == len(looks)
+
+
 def test_wide_ranges_have_logarithmic_colours() -> None:
     for values, logarithmic in (
         (np.linspace(1.0, 7.0, 50), False),

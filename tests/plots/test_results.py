@@ -61,6 +61,10 @@ def test_tracking_run_is_drawn_over_time() -> None:
     np.testing.assert_allclose(line(error, "tip error"), np.c_[run.time, 1e3 * run.tip_error])
     np.testing.assert_allclose(line(stiffness, "wanted:z")[:, 1], 1e-3 * run.target[:, 0])
     np.testing.assert_allclose(line(stiffness, "reached:z")[:, 1], 1e-3 * run.stiffness[:, 0])
+    dashes = [artists(stiffness, f"{name}:z")[f"{name}:z"].get_linestyle() for name in (
+        "wanted", "reached")]  # fmt: skip
+    assert dashes == ["--", "-"]
+    assert [*labels(stiffness).values()] == ["along z; dashed: wanted"]
     np.testing.assert_allclose(line(band, "displacement")[:, 1], 1e3 * run.displacement)
     edge = artists(band, "band")["band"].get_paths()[0].vertices[:, 1]
     half = 1e3 * run.band[np.isfinite(run.band)].max()

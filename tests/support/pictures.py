@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.text import Text
 
 from cdsm.plots.style import figure_of
@@ -95,9 +96,29 @@ def texts(figure: Figure) -> list[Text]:
     ]
 
 
+_LOOK = ("color", "facecolor", "edgecolor", "hatch", "linestyle", "linewidth", "marker", "alpha")
+
+
+def require_keys(figure: Figure) -> None:
+    """Every entry of a legend has words and a look that no other entry of it has."""
+    for legend in figure.findobj(Legend):
+        assert isinstance(legend, Legend)
+        said = [text.get_text() for text in legend.get_texts()]
+        looks = [
+            str([getattr(key, f"get_{name}", str)() for name in _LOOK])
+            for key in legend.legend_handles
+        ]
+        assert len({*said}) == len(said), said
+        assert len({*looks}) == len(said), dict(zip(said, looks, strict=True))
+
+
 def require_look(picture: Any) -> None:
-    """Units on both axes, three ticks or more, no text over another or outside the figure."""
+    """Units on both axes, three ticks or more, no text over another or outside the figure.
+
+    Entries of legends are told apart.
+    """
     figure = figure_of(picture)
+    require_keys(figure)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     renderer = canvas.get_renderer()
