@@ -222,7 +222,15 @@ def test_numbers_of_the_page_are_those_of_the_stiffness() -> None:
 def test_the_pill_has_the_colour_of_the_outcome(name: str) -> None:
     outcome = REPORTS[name].outcome
     kind = {"PASS": "pass", "FAIL": "fail", "NOT CHECKED": "not-checked"}[outcome]
-    assert f'<span class="pill {kind}">{outcome}</span>' in REPORTS[name].to_html()
+    shown = REPORTS[name].to_html()
+    assert f'<span class="pill {kind}">{outcome}</span>' in shown
+    ink = {"pass": "good", "fail": "bad", "not-checked": "open"}[kind]
+    assert f".{kind}{{background:var(--{ink})}}" in shown
+    red, green, blue = bytes.fromhex(re.search(rf"--{ink}:#(\w+)", shown)[1])  # type: ignore[index]
+    assert (green > red) == (ink == "good")
+    assert max(red, green) > blue
+    found = re.findall(r'<tr class="(\w*)"><td>(along|  of it passive)', shown)
+    assert found == [("main", "along"), ("part", "  of it passive")]
 
 
 def test_the_pictures_of_the_page_are_those_of_its_stiffness(

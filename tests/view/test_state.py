@@ -11,9 +11,9 @@ import cdsm
 from cdsm.status import Status
 from cdsm.support.values import Array
 from cdsm.view.saving import python_text
-from cdsm.view.scene import Scene
+from cdsm.view.scene import SLIDES, STICKS, Scene
 from cdsm.view.state import Setting, Shown, show
-from cdsm.view.texts import answer_text, head_text, tensions_text
+from cdsm.view.texts import answer_text, head_text, matrix_text, tensions_text
 from tests.core.test_posture import ring
 from tests.support import foreign
 from tests.support.arms import readme_geometry
@@ -160,7 +160,10 @@ def test_what_is_shown_is_the_equilibrium_of_the_arm_tensioned_without_the_force
     sticking, sliding = stuck.holes
     assert 0 < np.count_nonzero(history.sliding[0]) == len(sliding)
     assert len(sticking) + len(sliding) == len(history.holes)
-    assert f"{len(sticking)} holes stick" in text(stuck)
+    swatch = '<span style="background:rgb{};border-radius:0.2em">&emsp;</span>'
+    legend = f"{swatch.format(STICKS)} {len(sticking)} holes stick, "
+    legend += f"{swatch.format(SLIDES)} {len(sliding)} slide"
+    assert legend in text(stuck)
     assert numbers(stuck)["stiffness along x, y, z"] == along(history.stiffness(0))
     moved = sagged(arm, UNSTABLE, (0.0, 0.0, 0.0))
     assert moved.status is Status.MOVED
@@ -203,6 +206,28 @@ def test_the_point_of_a_link_moves_as_the_arm_does() -> None:
     said = numbers(shown)
     assert said["displacement of link2"] == ", ".join(f"{1e3 * x:z.1f}" for x in moved)
     assert said["displacement"] == ", ".join(f"{1e3 * x:z.1f}" for x in rest.displacement)
+
+
+def test_tensions_at_their_bounds_are_marked_by_which_it_is() -> None:
+    arm = soft_arm()
+    pose = arm.at(setting(arm).q)
+    most = float(cdsm.distribute_tension(pose, STABLE).values.max()) * (1.0 + 1e-9)
+    shown = show(arm, replace(setting(arm), maximum=most))
+    F = cdsm.distribute_tension(pose, STABLE, most).values
+    marks = re.findall(r"N (\w*)</span></div>", tensions_text(shown))
+    low, high = F <= STABLE * (1.0 + 1e-6), most * (1.0 - 1e-6) <= F
+    assert low.any()
+    assert high.any()
+    assert marks == [
+        "min" * a + "max" * b for a, b in zip(low.tolist(), high.tolist(), strict=True)
+    ]
+
+
+def test_rows_and_columns_of_the_matrix_have_their_names() -> None:
+    said = matrix_text(show(soft_arm(), setting(soft_arm())))
+    assert re.findall(r"<tr><th>(\w+)</th>", said) == ["x", "y", "z", "mx", "my", "mz"]
+    columns = re.findall(r'<th style="text-align:right">([\w ]*)</th>', said)
+    assert columns == ["", "x", "y", "z", "turn x", "turn y", "turn z"]
 
 
 def rod() -> cdsm.Manipulator:
