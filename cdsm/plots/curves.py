@@ -368,7 +368,7 @@ def plot_weight_test(test: WeightTest, ax: Axes | None = None, *, title: str | N
         look: dict[str, Any] = {"fontsize": 7, "color": style.SOFT, "ha": "right", "va": "bottom"}
         look |= {"xytext": (-4, 1), "textcoords": "offset points"}
         part = 0.93
-        if test.history is not None:  # the curve with friction is above
+        if test.history is not None or loads[-1] > slope * moved[-1]:  # the curve is above
             part = 0.6
             look |= {"ha": "left", "va": "top", "xytext": (4, -2)}
         panel.annotate(words, (part * end, part * end * slope), **look)
