@@ -57,7 +57,9 @@ def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
         dataset = dataset.expand_dims("entry")
     status = dataset["status"]
     columns: dict[str, NDArray[Any]] = {}
-    for name in (*dataset.coords, *dataset.data_vars):
+    # coordinates that are read from a store come in any order
+    coordinates = sorted(dataset.coords, key=lambda name: (name not in status.dims, str(name)))
+    for name in (*coordinates, *dataset.data_vars):
         variable = dataset[name]
         if name == "status" or (variable.dims == (name,) and name not in status.dims):
             continue  # coordinates of components appear in the names of the columns
