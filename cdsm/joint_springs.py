@@ -52,19 +52,19 @@ class Springs:
     @cached_property
     def constant(self) -> Array:
         """Stiffness k (n,) of the linear springs; 0 where there is a law, or none."""
-        if not self.laws:
-            return self.stiffness
-        k = self.stiffness.copy()
-        k[[*self.laws]] = 0.0
-        return frozen(k)
+        return self._with_laws_as(0.0)
 
     @cached_property
     def coefficients(self) -> Array:
         """Stiffness k (n,) of the linear springs, and the factor 1 of those with a law."""
+        return self._with_laws_as(1.0)
+
+    def _with_laws_as(self, value: float) -> Array:
+        """Return the stiffness (n,) of the linear springs, with a number where there is a law."""
         if not self.laws:
             return self.stiffness
         k = self.stiffness.copy()
-        k[[*self.laws]] = 1.0
+        k[[*self.laws]] = value
         return frozen(k)
 
     @cached_property

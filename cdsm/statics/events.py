@@ -107,7 +107,8 @@ def first_slips(events: Sequence[Event]) -> list[Event]:
     for event in events:
         if event.kind == "slip" and event.step in steps:
             continue
-        steps |= {event.step} if event.kind == "slip" else set()
+        if event.kind == "slip":
+            steps.add(event.step)
         told.append(event)
     return told
 

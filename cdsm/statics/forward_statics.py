@@ -127,15 +127,15 @@ def forward_statics(
     W = loads_of(arm, wrench)
     home = _home(arm, assembly, named[0])
     begin = home if start is None else arm.at(start)
+    driven = dict[str, Any]()
     if motors is None:
         model = _model(arm, named[0], _of_all(arm, named[0], commands[named[0]]), home, begin, W)
     else:
-        model = _driven_model(assembly or _straight(home), motors, begin, W)
-    loaded = model(1.0)
-    driven = dict[str, Any]()
-    if motors is not None:
         wires = assembly or _straight(home)
-        driven = {"commands": wires.commanded(motors), "reference_tension": wires.tension}
+        goal = wires.commanded(motors)
+        model = _driven_model(wires, goal, begin, W)
+        driven = {"commands": goal, "reference_tension": wires.tension}
+    loaded = model(1.0)
     if start is not None:
         return replace(as_equilibrium(loaded, settled(loaded, begin)), **driven)
     if assembly is None:
@@ -171,12 +171,9 @@ def _straight(home: Posture) -> Assembly:
     return assemble(home, home.arm.laws.rest)
 
 
-def _driven_model(
-    assembly: Assembly, motors: ArrayLike | Mapping[str, float], begin: Posture, wrench: Applied
-) -> Model:
-    """Return the arm of an assembly whose motors go from its commands to ``motors``."""
+def _driven_model(assembly: Assembly, goal: Array, begin: Posture, wrench: Applied) -> Model:
+    """Return the arm of an assembly whose motors go from its commands to ``goal``."""
     start = assembly.commands
-    goal = assembly.commanded(motors)
     assembly.require_wire(goal)
 
     def model(share: float) -> LockedArm:

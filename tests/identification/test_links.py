@@ -1,6 +1,7 @@
 """Weights that hang on links, and links that are read, in measurements and their files."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,16 +54,14 @@ def test_a_loop_on_a_link_is_a_load_cycle_there(friction: float) -> None:
     arm = _soft(friction=friction)
     pose = arm.at(Q)
     forces = [0.0, 2.0, 4.0, 2.0, 0.0]
-    loop = cdsm.WeightLoop(
-        direction="-z",
-        angles=tuple(Q),
-        forces=tuple(forces),
-        displacement_std=1e-5,
-        minimum=30.0,
-        wrench=(HUNG,),
-        link="link2",
-    )
-    read = loop.simulated(arm)
+    test: dict[str, Any] = {
+        "direction": "-z",
+        "angles": tuple(Q),
+        "forces": tuple(forces),
+        "displacement_std": 1e-5,
+        "minimum": 30.0,
+    }
+    read = cdsm.WeightLoop(**test, wrench=(HUNG,), link="link2").simulated(arm)
     assert read.displacements is not None
     rows = [[HUNG, cdsm.Load("link2", (0.0, 0.0, -f))] for f in forces]
     pull = cdsm.distribute_tension(pose, 30.0, wrench=[HUNG])
@@ -71,13 +70,7 @@ def test_a_loop_on_a_link_is_a_load_cycle_there(friction: float) -> None:
     down = [place[2] - history.pose(k).link_pose("link2")[2, 3] for k in range(5)]
     np.testing.assert_allclose(read.displacements, down, atol=1e-7 if friction == 0.0 else 1e-15)
     assert max(down) > 1e-4
-    at_tip = cdsm.WeightLoop(
-        direction="-z",
-        angles=tuple(Q),
-        forces=tuple(forces),
-        displacement_std=1e-5,
-        minimum=30.0,
-    ).simulated(arm)
+    at_tip = cdsm.WeightLoop(**test).simulated(arm)
     assert at_tip.displacements is not None
     assert np.max(at_tip.displacements) > 2.0 * max(down)
 
