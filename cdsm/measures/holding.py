@@ -17,9 +17,10 @@ from cdsm.posture import Posture
 from cdsm.statics.buckling import critical_load
 from cdsm.statics.continuation import follow
 from cdsm.statics.equilibrium import equilibrium
-from cdsm.statics.events import Event, Kind, events_on, events_text, mass_of, watched
+from cdsm.statics.events import Event, Kind, events_text
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.pieces import stage_at
+from cdsm.statics.smooth_events import events_on, mass_of, watched
 from cdsm.status import Status
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.progress import progress_bar

@@ -18,11 +18,11 @@ from cdsm.motors import refuse_rough, refuse_shared
 from cdsm.posture import Posture
 from cdsm.statics.continuation import follow
 from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, settled, with_forced
-from cdsm.statics.events import events_on, watched
 from cdsm.statics.load_cycle import Approach, approach
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.pieces import Model, stage_at
 from cdsm.statics.quasi_static import QuasiStaticArm
+from cdsm.statics.smooth_events import events_on, watched
 from cdsm.stiffness_matrix import checked_tension
 from cdsm.support.format import place, plural
 from cdsm.support.validation import (

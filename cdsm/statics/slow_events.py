@@ -2,12 +2,7 @@
 
 The loading is followed anew, from event to event: at each, the history up to there is kept, so it
 does not matter how long the steps are. From there on the equilibrium is a function of the share of
-the step. A cable begins to slide in a hole, towards its end or its motor, where
-
-    μ φ ∓ (ln T_{j+1} − ln T_j) − max(±s_j, 0)/(κ_j T_j) = 0,
-
-with the wire s_j that slips since then and the compliance κ_j of the segment before the hole:
-the first two terms are zero while it slides, the last one while it sticks.
+the step. :mod:`cdsm.statics.slow_watch` has the quantities that change their sign at events.
 """
 
 from __future__ import annotations
@@ -16,10 +11,9 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cdsm.friction.capstan import can_stick
-from cdsm.statics.events import Event, Kind, Watched, buckling_joint, crossings
+from cdsm.statics.crossings import ROUNDING, Watched, crossings
+from cdsm.statics.events import Event, Kind, buckling_joint
 from cdsm.statics.hung_loads import total_force
 from cdsm.statics.pieces import root
 from cdsm.statics.quasi_static import (
@@ -30,12 +24,11 @@ from cdsm.statics.quasi_static import (
     QuasiStaticState,
     Substep,
 )
-from cdsm.statics.solve import ArmState, Balance, Point, continued
+from cdsm.statics.slow_watch import SlowStage, known_point, watched_slowly
+from cdsm.statics.solve import continued
 from cdsm.support.progress import show_progress
-from cdsm.support.validation import SMALLEST
 from cdsm.support.values import Array, frozen
 
-_ROUNDING = 1e-9  # a quantity below this part of its scale is zero
 _ZERO = 0.1  # part of this rounding that ends the search for a root
 _NEXT = 4.0  # the way to look for the next event, over that to the last one
 _LEAST = 2.0**-6  # least way between events that are located one by one, over a sub-step
@@ -54,20 +47,12 @@ class Way(NamedTuple):
     paths: tuple[EquilibriumPath, ...]  # the equilibria on the way to each load
 
 
-class _Stage(NamedTuple):
-    """Equilibrium within a sub-step."""
-
-    share: float  # of the sub-step
-    point: Point
-    balance: Balance
-
-
 def slow_events(way: Way, holes: Sequence[str]) -> tuple[tuple[Event, ...], Array]:
     """Locate the events on a way; return them with the joint coordinates at each (m, nv) [rad].
 
     ``holes`` (P,) are the names of the holes.
     """
-    walk = _Walk(way.arm, way.start, _watched(way.arm, holes))
+    walk = _Walk(way.arm, way.start, watched_slowly(way.arm, holes))
     ways = zip(way.loads, way.substeps, way.paths, strict=True)
     for k, (load, substeps, near) in enumerate(show_progress([*ways], "events")):
         walk.to_load(k, load, substeps, near)
@@ -79,7 +64,7 @@ class _Walk:
     """Slow loading from event to event."""
 
     def __init__(
-        self, arm: QuasiStaticArm, start: QuasiStaticState, watch: Watched[_Stage]
+        self, arm: QuasiStaticArm, start: QuasiStaticState, watch: Watched[SlowStage]
     ) -> None:
         self._arm = arm
         self._watch = watch
@@ -88,9 +73,9 @@ class _Walk:
         self.events = list[Event]()
         self.angles = list[Array]()
         f = arm.balance(start, start.load)
-        here = _Stage(0.0, _point(f, start.arm_state, start.x), f)
+        here = SlowStage(0.0, known_point(f, start.arm_state, start.x), f)
         self._values = watch.value(here)
-        self._none = _ROUNDING * watch.scale(here)
+        self._none = ROUNDING * watch.scale(here)
         self._passed = self._values < -self._none  # which quantities are negative
         self._slips = np.array([kind == "slip" for kind in watch.kinds], dtype=np.bool_)
 
@@ -127,14 +112,14 @@ class _Walk:
         def action(share: float) -> Action:
             return begin.interpolate(load, share)
 
-        def found(share: float) -> _Stage | None:
+        def found(share: float) -> SlowStage | None:
             f = self._arm.balance(self._state, action(share))
             guesses = [near[share]] if share in near else []
             if far:  # on the straight way there
                 part = (share - self._share) / (goal - self._share)
                 guesses = [self._state.x + part * (far[0] - self._state.x)]
             point = continued(f, [*guesses, self._state.x], self._state.arm_state.pose.q)
-            return None if point is None else _Stage(share, point, f)
+            return None if point is None else SlowStage(share, point, f)
 
         far = list[Array]()
         there = found(goal)
@@ -163,11 +148,11 @@ class _Walk:
         return True
 
     def _roots(
-        self, found: Callable[[float], _Stage | None], there: _Stage
-    ) -> list[tuple[int, _Stage]]:
+        self, found: Callable[[float], SlowStage | None], there: SlowStage
+    ) -> list[tuple[int, SlowStage]]:
         """Return all quantities that pass before ``there``, and where, in their order."""
         after = self._watch.value(there)
-        roots = list[tuple[int, _Stage]]()
+        roots = list[tuple[int, SlowStage]]()
         for i in np.flatnonzero(~self._passed & (after < -self._none)).tolist():
             stage = found(self._root(found, there, i, {there.share: after}))
             roots.append((i, stage or there))
@@ -175,8 +160,8 @@ class _Walk:
 
     def _root(
         self,
-        found: Callable[[float], _Stage | None],
-        there: _Stage,
+        found: Callable[[float], SlowStage | None],
+        there: SlowStage,
         i: int,
         known: dict[float, Array],
         end: float | None = None,
@@ -200,8 +185,8 @@ class _Walk:
         return root(value, self._share, end, precision)
 
     def _first(
-        self, found: Callable[[float], _Stage | None], there: _Stage
-    ) -> tuple[list[int], _Stage]:
+        self, found: Callable[[float], SlowStage | None], there: SlowStage
+    ) -> tuple[list[int], SlowStage]:
         """Return the quantities that pass first before ``there``, and where; else ``there``."""
         before = self._values
         after = self._watch.value(there)
@@ -222,14 +207,14 @@ class _Walk:
         now &= ~self._passed & ((after < -self._none) | self._slips)  # some slide for a moment only
         return np.flatnonzero(now).tolist(), stage
 
-    def _stand(self, stage: _Stage, load: Action) -> None:
+    def _stand(self, stage: SlowStage, load: Action) -> None:
         """Keep the history up to an equilibrium."""
         state = stage.point.state
         assert isinstance(state, ChainArmState)
         self._state = QuasiStaticState(load, state, stage.point.x, stage.point.stop_torque)
         self._share = stage.share
         self._values = self._watch.value(stage)
-        self._none = _ROUNDING * self._watch.scale(stage)
+        self._none = ROUNDING * self._watch.scale(stage)
         self._passed &= self._values <= self._none
         self._passed |= self._values < -self._none
 
@@ -255,28 +240,28 @@ class _Walk:
                 self.angles.append(stage.point.state.pose.q)
         after = parts[-1].after
         f = self._arm.balance(after, after.load)
-        point = _point(f, after.arm_state, after.x)._replace(stop_torque=after.stop_torque)
-        self._stand(_Stage(goal, point, f), after.load)
+        point = known_point(f, after.arm_state, after.x)._replace(stop_torque=after.stop_torque)
+        self._stand(SlowStage(goal, point, f), after.load)
 
 
 def _within(
-    arm: QuasiStaticArm, part: Substep, watch: Watched[_Stage]
-) -> list[tuple[Kind, str, _Stage]]:
+    arm: QuasiStaticArm, part: Substep, watch: Watched[SlowStage]
+) -> list[tuple[Kind, str, SlowStage]]:
     """Return the events of a sub-step in their order."""
 
-    def found(share: float) -> _Stage | None:
+    def found(share: float) -> SlowStage | None:
         f = arm.balance(part.before, part.before.load.interpolate(part.after.load, share))
         between = part.before.x + share * (part.after.x - part.before.x)
         point = continued(f, (between, part.before.x), part.before.arm_state.pose.q)
-        return None if point is None else _Stage(share, point, f)
+        return None if point is None else SlowStage(share, point, f)
 
-    def at(share: float) -> _Stage:
+    def at(share: float) -> SlowStage:
         return found(share) or last
 
     f = arm.balance(part.before, part.before.load)
-    here = _Stage(0.0, _point(f, part.before.arm_state, part.before.x), f)
+    here = SlowStage(0.0, known_point(f, part.before.arm_state, part.before.x), f)
     f = arm.balance(part.before, part.after.load)
-    there = _Stage(1.0, _point(f, part.after.arm_state, part.after.x), f)
+    there = SlowStage(1.0, known_point(f, part.after.arm_state, part.after.x), f)
     last = there
     if part.snapped:
         last = here
@@ -298,80 +283,3 @@ def _within(
             if watch.kinds[i] in _SINCE
         ]
     return events
-
-
-def _point(f: Balance, state: ArmState, x: Array) -> Point:
-    """Return an equilibrium with the state that was found there, which knows its own slips."""
-    return f(x)._replace(state=state)
-
-
-def _watched(arm: QuasiStaticArm, holes: Sequence[str]) -> Watched[_Stage]:
-    """Return what an arm with friction is watched for."""
-    robot = arm.reference.arm
-    cables = robot.cables
-    names = cables.names
-    first = arm.start[:-1]
-    rough = np.array([any(cable.friction) for cable in cables])
-    held = ~arm.forced
-    known = held | rough  # a motor that holds the tension without friction needs no law
-    most = np.array([cable.maximum for cable in cables])
-    low = np.array([cable.elasticity.low for cable in cables])
-    high = np.array([cable.elasticity.high for cable in cables])
-    stretched = np.flatnonzero(held)
-    limited = np.flatnonzero(np.isfinite(most))
-    begun = np.flatnonzero(known & (low > 0.0))
-    ended = np.flatnonzero(known & np.isfinite(high))
-    stops = np.flatnonzero(np.isfinite([robot.lower, robot.upper]))
-    of_cables: tuple[tuple[Kind, NDArray[np.intp]], ...] = (
-        ("slack", stretched),
-        ("maximum", limited),
-        ("law", begun),
-        ("law", ended),
-    )
-    kinds: list[Kind] = ["slip"] * (2 * len(holes))
-    kinds += [kind for kind, indices in of_cables for _ in indices]
-    kinds += ["stop"] * stops.size
-    places = [*holes, *holes]
-    places += [names[c] for _, indices in of_cables for c in indices]
-    places += [robot.joint_names[i % robot.nv] for i in stops]
-
-    def value(stage: _Stage) -> Array:
-        state = stage.point.state
-        assert isinstance(state, ChainArmState)
-        T = state.tension
-        least = np.minimum.reduceat(T, first)
-        largest = np.maximum.reduceat(T, first)
-        return np.concatenate(
-            [
-                *_slips(state),
-                arm.continued_tensions(state)[stretched],
-                (most - largest)[limited],
-                (least - low)[begun],
-                (high - largest)[ended],
-                stage.balance.gaps(stage.point.x).ravel()[stops],
-            ]
-        )
-
-    def scale(stage: _Stage) -> Array:
-        size = max(float(stage.point.state.tension.max(initial=0.0)), SMALLEST)
-        tensions = sum(indices.size for _, indices in of_cables)
-        parts = (1.0, 2 * len(holes)), (size, tensions), (1.0, stops.size)
-        return np.concatenate([np.full(count, unit) for unit, count in parts])
-
-    return Watched(tuple(kinds), tuple(places), value, scale)
-
-
-def _slips(state: ChainArmState) -> tuple[Array, Array]:
-    """Return what is negative where a cable slides towards its end, or its motor (P,) [-]."""
-    segments = state.pose.segments
-    hole = segments.chains.hole
-    T = np.maximum(state.tension, SMALLEST)
-    rise = (np.log(T[1:]) - np.log(T[:-1]))[hole] if hole.size else np.empty(0)
-    taut = state.tension[hole] > 0.0
-    sticks = can_stick(state.pose) & taut
-    beyond = state.chain.slip[hole] / np.where(taut, state.chain.compliance[hole] * T[hole], 1.0)
-    towards_end, towards_motor = (
-        np.where(sticks, segments.grip - way * rise - np.maximum(way * beyond, 0.0), 1.0)
-        for way in (1.0, -1.0)
-    )
-    return towards_end, towards_motor

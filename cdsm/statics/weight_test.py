@@ -17,11 +17,13 @@ from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.loads import LoadsLike, link_point
 from cdsm.posture import Posture
 from cdsm.statics.continuation import follow
+from cdsm.statics.crossings import Watched
 from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, equilibrium
-from cdsm.statics.events import Event, Watched, events_on, events_text, mass_of, watched
+from cdsm.statics.events import Event, events_text
 from cdsm.statics.load_cycle import LoadHistory, follow_loads
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.pieces import Model, Stage, equilibrium_near, stage_at
+from cdsm.statics.smooth_events import events_on, mass_of, watched
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import coordinates, plural, stiffness_text, without_rounding

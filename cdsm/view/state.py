@@ -21,8 +21,9 @@ from cdsm.plots.style import tension_colors
 from cdsm.posture import Posture
 from cdsm.report.remedies import find_remedies
 from cdsm.statics.equilibrium import Equilibrium
-from cdsm.statics.events import Event, events_under
+from cdsm.statics.events import Event
 from cdsm.statics.locked_arm import LockedArm
+from cdsm.statics.smooth_events import events_under
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.verdict import Finding, Verdict, find_excess
