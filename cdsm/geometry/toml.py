@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from inspect import signature
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, cast
 
 from pydantic import AfterValidator, Field
 
 from cdsm.errors import GeometryError
 from cdsm.geometry.geometry import Geometry
 from cdsm.geometry.uniform import Turn
-from cdsm.support.records import Name, parse, record
+from cdsm.support.records import Name, faults_at, parse, record
 
 _FORMS: Final = ("sections", "universal", "hinged", "backbone", "rolling", "geometry")
 """Tables that describe a geometry; a file may have the keys of [geometry] at its top instead."""
@@ -87,7 +87,12 @@ def build(data: Mapping[str, Any]) -> Geometry:
     table = data[kind] if kind else data
     if not isinstance(table, dict):
         raise GeometryError([f"{kind}: is {table!r}; give a table [{kind}]"])
-    return parse(Geometry, table) if kind in ("", "geometry") else getattr(Geometry, kind)(**table)
+    if kind in ("", "geometry"):
+        return parse(Geometry, table)
+    try:
+        return cast(Geometry, getattr(Geometry, kind)(**table))
+    except GeometryError as error:
+        raise GeometryError(faults_at(kind, error)) from None
 
 
 @record

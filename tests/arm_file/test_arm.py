@@ -160,8 +160,13 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
         ('wire = "1x19-1.2mm"', "wire = {kind = 'linear'}", "wire.rigidity: is missing"),
         ("[cables.cable2_3]", "[cables.cable2_4]", "no cable is called 'cable2_4'; did you mean"),
         ("control =", "contrl =", "cables.cable2_3.contrl: is not a key that is known here; did"),
-        ("joints = 2", "joints = 0", "joints"),
-        ("joints = 2", "jonits = 2", "jonits: is not a key that is known here; did you mean 'joi"),
+        ("joints = 2", "joints = 0", "- universal.joints: "),
+        ("joints = 2", "# joints", "- universal.joints: is missing"),
+        (
+            "joints = 2",
+            "jonits = 2",
+            "universal.jonits: is not a key that is known here; did you mean 'joi",
+        ),
         ("[universal]", "[universal", "is not TOML"),
     ],
 )

@@ -77,9 +77,15 @@ def test_exit_codes_and_messages(
     ("change", "said"),
     [
         ("minimum=a", "minimum: input should be a valid number, but is 'a'"),
-        ("universal.link_mas=1", "link_mas: is not a key that is known here; did you mean"),
+        (
+            "universal.link_mas=1",
+            "universal.link_mas: is not a key that is known here; did you mean",
+        ),
         ("cables.cable9_1.wire=3", "no cable is called 'cable9_1'"),
-        ("universal.minimum=3", "minimum: is not a key that is known here; it belongs at the top"),
+        (
+            "universal.minimum=3",
+            "universal.minimum: is not a key that is known here; it belongs at the top",
+        ),
         ("lead=3", "write it below [universal]"),
         ("link_length=3", "write it below [universal]"),
         ("minmum=3", "minmum: is not a key that is known here; did you mean 'minimum'?"),
