@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import shlex
@@ -122,6 +121,8 @@ def _fit_spring(
 
 def _pair(option: str, text: str | None) -> list[str] | None:
     """Split the text of an option at its comma; an entry with a comma has quotes."""
+    import csv  # slow to import
+
     if text is None:
         return None
     entries = [entry.strip() for entry in next(csv.reader([text], skipinitialspace=True), [])]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -82,6 +81,8 @@ JsonOption = Annotated[bool, opt("Print answer (SI) and errors as JSON.", None, 
 
 def changes_of(texts: Iterable[str] | None) -> dict[str, Any]:
     """Parse the texts of --set; what is no TOML is a number such as .5, or a string."""
+    import tomllib  # slow to import
+
     from cdsm.support.records import laid_over
 
     changes: dict[str, Any] = {}
