@@ -169,7 +169,7 @@ def assemble(pose: Any, tension: ArrayLike) -> Assembly:
     if not pose.equals(of):
         raise InvalidInput("tension", "is of another posture; distribute it at this one.")
     count = len(arm.cables)
-    F = vector("tension", np.asarray(given), count, "one tension [N] per cable", "tension")
+    F = vector("tension", given, count, "one tension [N] per cable", "tension")
     if F.min() < 0.0:
         c = int(F.argmin())
         raise InvalidInput("tension", f"{F[c]:g} N for {arm.cables.names[c]}; cables only pull.")

@@ -112,12 +112,13 @@ class Pulley:
         if turns < 0.0 or turns != round(turns):
             message = f"{turns:g} given for a {where}; a whole number, 0 or more, is needed. "
             raise InvalidInput("turns", message + "Turn its axis over for the other side.")
+        groove = flag("groove", self.groove)
         friction = checked_quantity("friction", self.friction, "friction", zero=True)
         bearing = scalar("bearing", self.bearing)
         if not 0.0 <= bearing < 1.0:
             message = f"{bearing:g} given for a {where}; 0 to 1 is needed: μ_bearing r_bearing/r."
             raise InvalidInput("bearing", message)
-        if not self.groove and (friction or bearing):
+        if not groove and (friction or bearing):
             message = f"a smooth {where} has friction; how a cable then shifts along the axis is "
             raise InvalidInput("friction", message + "not modelled. Give a groove, or no friction.")
         if friction and bearing:
@@ -127,7 +128,7 @@ class Pulley:
             position=tuple(position.tolist()),
             axis=tuple(axis.tolist()),
             radius=checked_quantity("radius", self.radius, "length"),
-            groove=flag("groove", self.groove),
+            groove=groove,
             turns=int(turns),
             friction=friction,
             bearing=bearing,
@@ -190,6 +191,9 @@ class JointPulley:
         )
 
 
+_PIECES = 1000  # of a sheath at most
+
+
 @final
 @dataclass(frozen=True)
 class Sheath:
@@ -204,8 +208,8 @@ class Sheath:
         length: Length of the sheath [m].
         wrap: Total angle φ by which it is bent [rad], 0 to 4π, at the working posture.
         friction: Coulomb friction coefficient μ [-] between cable and sheath, 0 to 2.
-        pieces: Number of places at which friction acts; 8 are within 0.5 % of the continuous
-            sheath for μφ = 1.
+        pieces: Number of places at which friction acts, 1 to 1000; 8 are within 0.5 % of the
+            continuous sheath for μφ = 1.
 
     Raises InvalidInput if an attribute is anything else.
 
@@ -224,7 +228,7 @@ class Sheath:
     def __post_init__(self) -> None:
         check_numbers(self)
         self.__dict__["length"] = checked_quantity("length", self.length, "length")
-        self.__dict__["pieces"] = whole_number("pieces", self.pieces, 1)
+        self.__dict__["pieces"] = whole_number("pieces", self.pieces, 1, _PIECES)
 
 
 PathElement = Site | Pulley | Sheath

@@ -122,13 +122,14 @@ class ArmDefinition:
         gravity = gravity_vector("gravity", self.gravity)
         names = self.joint_names
         cables = _checked_cables(self.cables)
+        no_motors = isinstance(self.motors, (list, tuple)) and not self.motors
         checked = {
             "cables": cables,
             "gravity": tuple(gravity.tolist()),
             "joint_names": None if names is None else sequence_of("joint_names", names, str),
             "tolerances": instance("tolerances", self.tolerances, Tolerances),
             "terms": checked_terms(self.terms),
-            "motors": checked_motors(self.motors, cables) if self.motors else (),
+            "motors": () if no_motors else checked_motors(self.motors, cables),
             "loads": sequence_of("loads", self.loads, Load),
         }
         for name, value in checked.items():

@@ -427,9 +427,8 @@ class Manipulator(ComputedArm):
 
 def _read(cables: CablesOrFile | None) -> Cable | Sequence[Cable]:
     """Return cables, given as such or as the path of their file."""
-    assert cables is not None
     if isinstance(cables, (str, os.PathLike)):
         from cdsm.arm_file.arm import read_cables
 
         return read_cables(cables)
-    return cables
+    return () if cables is None else cables

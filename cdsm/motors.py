@@ -69,7 +69,8 @@ class Motor:
         text("name", self.name)
         try:
             one_of("control", self.control, get_args(MotorControl))
-            if self.control == "position" and self.stiffness == 0.0:
+            k: object = self.stiffness
+            if self.control == "position" and isinstance(k, (int, float)) and k == 0.0:
                 raise CdsmError("stiffness: 0 N m/rad holds no angle; give control='torque'.")
             check_numbers(self)
             if self.control == "torque" and math.isfinite(self.stiffness):

@@ -33,7 +33,7 @@ from cdsm.motors import Motor, MotorControl, checked_motors, require_cables
 from cdsm.rigid_body import GRAVITY
 from cdsm.springs import JointSpring
 from cdsm.support import records
-from cdsm.support.files import read_text
+from cdsm.support.files import as_path, read_text
 from cdsm.support.records import EACH, ONE, CrossFaults, laid_over, read_toml, record
 from cdsm.support.validation import gravity_vector, one_of
 from cdsm.tolerances import Tolerances, tolerances_from
@@ -67,7 +67,11 @@ def _read_tables(
     path: str | os.PathLike[str], changes: Mapping[str, Any] | None, robot: bool
 ) -> dict[str, Any]:
     """Read the tables of a file, ``changes`` laid over them, and the files of wires they name."""
-    if any(Path(path).glob("*_bodies.xml")):
+    given: Any = {} if changes is None else changes
+    if not isinstance(given, Mapping):
+        problem = f"{changes!r} given; give a dict of values by keys, such as "
+        raise InvalidInput("changes", problem + '{"universal.link_mass": 0.06}.')
+    if any(as_path(path).glob("*_bodies.xml")):
         problem = f"is the folder of a CASPR model. {_FROM} --wire EA`, and give that."
         raise FileError(path, problem.format(path=path))
     if str(path).endswith((".nc", ".zarr", ".csv")):
@@ -77,7 +81,7 @@ def _read_tables(
         problem = next(problem for sign, problem in _OTHERS.items() if sign in text)
         raise FileError(path, problem.format(path=path))
     tables: dict[str, Any] = read_toml(text)
-    for key, value in (changes or {}).items():
+    for key, value in given.items():
         change = value
         for name in reversed(str(key).split(".")):
             change = {name: change}
@@ -415,7 +419,7 @@ class ArmFile(_Settings, _Wires):
     urdf: Annotated[Urdf | None, AfterValidator(_alone)] = None
     lead: Annotated[records.LengthOrZero | None, AfterValidator(_of_routed)] = None
     cables: Annotated[_Tables, WrapValidator(_built), Field(validate_default=True)] = None  # type: ignore[assignment]
-    motors: Annotated[_Motors, AfterValidator(_moving)] = None
+    motors: Annotated[_Motors, AfterValidator(_moving)] = ()  # type: ignore[assignment]
 
 
 def _placed(fault: str, described: dict[str, Any]) -> str:

@@ -126,7 +126,8 @@ def _rows(link: str, rows: Any) -> tuple[int, ...]:
         if rows in ROWS:
             return ROWS[rows]
         rows = [rows] if rows in COMPONENTS else rows
-    entries = [*rows] if isinstance(rows, (list, tuple, np.ndarray)) else [rows]
+    rows = rows.tolist() if isinstance(rows, np.ndarray) else rows
+    entries = [*rows] if isinstance(rows, (list, tuple)) else [rows]
     found = [COMPONENTS.index(entry) if entry in COMPONENTS else entry for entry in entries]
     known = [
         row

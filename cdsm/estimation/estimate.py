@@ -23,7 +23,7 @@ from cdsm.loads import LoadsLike, loads_of
 from cdsm.posture import Posture
 from cdsm.support.determination import Determination
 from cdsm.support.format import plural
-from cdsm.support.validation import NO_WRENCH, instance, number_array, vector
+from cdsm.support.validation import NO_WRENCH, SMALLEST, instance, number_array, vector
 from cdsm.support.values import Array, frozen
 
 _ASSUMED = 0.01  # standard uncertainty of load cells over their largest reading, if none is given
@@ -219,8 +219,8 @@ def checked_readings(
             problem = f"1 % of the largest reading, {largest:g} N, tells nothing; give that of the"
             raise InvalidInput("tension_std", f"{problem} load cells, and check their signs.")
         tension_std = _ASSUMED * largest
-    std = _spread("tension_std", tension_std, cables, "force", "a load cell is not exact")
-    angle = _spread("angle_std", angle_std, arm.joint_names, None, "")
+    std = spread("tension_std", tension_std, cables, "force", "a load cell is not exact")
+    angle = spread("angle_std", angle_std, arm.joint_names, None, "")
     low = read < -_NOISE * std
     if low.any():
         c = int(low.argmax())
@@ -244,12 +244,12 @@ def checked_readings(
     )
 
 
-def _spread(
+def spread(
     name: str, value: ArrayLike, owners: tuple[str, ...], kind: str | None, exact: str
 ) -> Array:
     """Return standard uncertainties, one for each owner; InvalidInput if one is not positive.
 
-    ``exact`` says why 0 is refused; it is allowed if this is empty.
+    ``exact`` says why 0 is refused, and what is as good as 0; both are allowed if it is empty.
     """
     values = number_array(name, value, kind)
     if values.shape not in ((), (len(owners),)):
@@ -257,10 +257,10 @@ def _spread(
             name, f"shape {values.shape} given; give one number, or ({len(owners)},)."
         )
     values = np.broadcast_to(values, (len(owners),)).copy()
-    wrong = (values < 0.0) | ((values == 0.0) & bool(exact))
+    wrong = (values < 0.0) | ((values < SMALLEST) & bool(exact))
     if wrong.any():
         i = int(wrong.argmax())
-        why = exact if values[i] == 0.0 else "a standard uncertainty is not negative"
+        why = exact if values[i] >= 0.0 else "a standard uncertainty is not negative"
         raise InvalidInput(name, f"{values[i]:g} given for {owners[i]}; {why}.")
     return frozen(values)
 

@@ -23,7 +23,7 @@ from cdsm.applied import Applied, jacobian_at, position_at, without_cables
 from cdsm.dead_loads import LinkPoint
 from cdsm.errors import EquilibriumError, InvalidInput, listed
 from cdsm.estimation.balanced_loads import behind_holes
-from cdsm.estimation.estimate import checked_readings
+from cdsm.estimation.estimate import checked_readings, spread
 from cdsm.estimation.holes import SlidingLike, holes_of, sliding_of
 from cdsm.loads import LoadsLike, link_point, loads_of
 from cdsm.manipulator import Manipulator
@@ -38,6 +38,8 @@ from cdsm.terms import stiffness_of, torque_of
 
 _EXACT = 1e-6  # standard deviation of the balance over that by the load cells
 _TOLERANCE = 1e-12
+_POINT_STD = 1e-3  # of the coordinates of a tracked point [m], if none is given
+_WIRE_STD = 1e-4  # of the wire that the motors have left [m], if none is given
 
 
 @final
@@ -216,9 +218,9 @@ def estimate_posture(
     *,
     tension_std: ArrayLike | None = None,
     points: Mapping[str, ArrayLike] | None = None,
-    point_std: float = 1e-3,
+    point_std: float | None = None,
     rest_lengths: ArrayLike | None = None,
-    rest_length_std: ArrayLike = 1e-4,
+    rest_length_std: ArrayLike | None = None,
     sliding: SlidingLike | None = None,
     wrench: LoadsLike = NO_WRENCH,
     start: ArrayLike | None = None,
@@ -235,15 +237,17 @@ def estimate_posture(
         tension_std: Standard uncertainty of the load cells [N], as for :func:`estimate_load`.
         points: Positions (3,) [m] in base axes of links that were tracked: of the centre of the
             disk of a link, or of the origin of its frame, as for :class:`~cdsm.Load`.
-        point_std: Standard uncertainty of each of their coordinates [m].
+        point_std: Standard uncertainty of each of their coordinates [m]. Default: 1 mm.
         rest_lengths: Unstrained wire that the motors have left (C,) [m].
         rest_length_std: Its standard uncertainty [m], with that of EA: one number, or (C,).
+            Default: 0.1 mm.
         sliding: How each cable last slid in its holes, as for :func:`estimate_load`.
         wrench: Loads that are known, as for :func:`~cdsm.stiffness`.
         start: Angles near the posture (nv,) [rad]. Default: where the arm rests without friction.
 
     Raises:
-        InvalidInput: A shape, a link or a number is wrong.
+        InvalidInput: A shape, a link or a number is wrong; or an uncertainty is given of readings
+            that are not.
         EquilibriumError: The arm has no rest at these tensions, give ``start``; or the search from
             there ended nowhere.
 
@@ -271,15 +275,22 @@ def estimate_posture(
         wire = vector(
             "rest_lengths", rest_lengths, len(arm.cables), "one length [m] per cable", "length"
         )
-        std = np.broadcast_to(np.asarray(rest_length_std, np.float64), wire.shape)
-        if not (std > 0.0).all():
-            raise InvalidInput("rest_length_std", f"{std.min():g} m given; a wire is not exact.")
-        wires = wire, std
+        of_wire = _WIRE_STD if rest_length_std is None else rest_length_std
+        names = arm.cables.names
+        wires = wire, spread("rest_length_std", of_wire, names, "length", "a wire is not exact")
+    elif rest_length_std is not None:
+        raise InvalidInput("rest_length_std", "is of rest_lengths, which are not given.")
+    seen: Any = {} if points is None else points
+    if not isinstance(seen, Mapping):
+        wanted = "give a dict of positions (3,) [m] by the names of links."
+        raise InvalidInput("points", f"{points!r} given; {wanted}")
+    if not seen and point_std is not None:
+        raise InvalidInput("point_std", "is of points, which are not given.")
     tracked = [
         _Point(
             link_point(arm, link), vector(f"points[{link!r}]", x, 3, "a point (3,) [m]", "length")
         )
-        for link, x in (points or {}).items()
+        for link, x in seen.items()
     ]
     problem = _Problem(
         pose,
@@ -289,7 +300,7 @@ def estimate_posture(
         W,
         wires,
         tracked,
-        checked_quantity("point_std", point_std, "length"),
+        checked_quantity("point_std", _POINT_STD if point_std is None else point_std, "length"),
     )
     x = np.concatenate([pose.q, np.zeros(len(arm.cables) + problem.root.shape[1])])
     solved = least_squares(

@@ -346,10 +346,11 @@ def _keep(measurement: Measurement | WeightLoop, **fields: object) -> None:
     fields["angles"] = _row("angles", measurement.angles, "one angle [rad] per joint")
     if tension is not None:
         fields["tension"] = _row("tension", tension, "one tension [N] per cable")
-    elif np.ndim(minimum) == 0:  # type: ignore[arg-type]
-        fields["minimum"] = scalar("minimum", minimum)
     else:
-        fields["minimum"] = _row("minimum", minimum, "one bound [N] per cable")
+        lowest = number_array("minimum", minimum)  # type: ignore[arg-type]
+        one = lowest.ndim == 0
+        row = "one bound [N], or one per cable"
+        fields["minimum"] = float(lowest) if one else _row("minimum", lowest, row)
     for name, entry in fields.items():
         object.__setattr__(measurement, name, entry)
 

@@ -15,7 +15,7 @@ from cdsm.springs.law import SpringLaw, checked_scale
 from cdsm.support.format import plural, span
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.tables import ANGLE, Columns
-from cdsm.support.validation import doubts_about_angle, number_array
+from cdsm.support.validation import doubts_about_angle, interval, number_array
 from cdsm.support.values import Array, Plotted, frozen
 
 SCALE: Final = math.radians(2.0)
@@ -146,14 +146,11 @@ def fit_spring(
     a = checked_scale(scale)
     if x.ndim != 1 or x.shape != y.shape:
         raise InvalidInput("torques", f"shapes {x.shape} and {y.shape} given; a point has both.")
-    limits = np.asarray(between)
-    if limits.shape != (2,) or limits.dtype.kind not in "iuf" or not limits[0] < limits[1]:
-        problem = f"{between!r} given; give (low, high) in rad, low below high."
-        raise InvalidInput("between", problem)
+    low, high = interval("between", between, "rad")
     for doubt in doubts_about_angle("an angle of a spring is", float(abs(x).max(initial=0)), _TURN):
         warn(doubt)
     order = np.argsort(x, kind="stable")
-    kept = order[(x[order] >= limits[0]) & (x[order] <= limits[1])]
+    kept = order[(x[order] >= low) & (x[order] <= high)]
     x = x[kept]
     y = y[kept]
     if (count := np.count_nonzero(x)) < _FEWEST:

@@ -112,7 +112,7 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 
 def as_path(path: str | os.PathLike[str]) -> Path:
     """Return a path; InvalidInput if it is none, FileError if it is empty."""
-    if path == "":  # which Path takes for the folder
+    if isinstance(path, str) and not path:  # which Path takes for the folder
         raise FileError("''", "is an empty path; give a file or folder.")
     try:
         return Path(path)

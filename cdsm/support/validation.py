@@ -167,6 +167,14 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
     return frozen(array)
 
 
+def interval(name: str, value: ArrayLike, unit: str) -> tuple[float, float]:
+    """Return two ends (low, high), low below high, or raise InvalidInput; ±inf is allowed."""
+    pair = _native(name, value)
+    if pair.shape != (2,) or not pair[0] < pair[1]:
+        raise InvalidInput(name, f"{value!r} given; give (low, high) in {unit}, low below high.")
+    return float(pair[0]), float(pair[1])
+
+
 def wrench_vector(name: str, value: ArrayLike) -> Array:
     """Check a wrench: force [N], then moment [N m]. Return it as a read-only vector (6,)."""
     items = value if isinstance(value, (list, tuple)) else [value]

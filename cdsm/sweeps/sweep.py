@@ -24,6 +24,7 @@ from cdsm.support.validation import (
     checked_quantity,
     flag,
     instance,
+    number_array,
     sequence_of,
     text,
     unit_directions,
@@ -155,7 +156,10 @@ def _cases_of(arm: Manipulator, value: Any) -> tuple[tuple[Applied, ...], Sequen
         labels = names or range(len(wrenches))
         pairs = zip(labels, wrenches, strict=True)
         return tuple(loads_of(arm, case, f"wrench[{name!r}]") for name, case in pairs), labels
-    W = check_load_rows(arm, wrenches, len(wrenches)).at_tip
+    rows = number_array("wrench", wrenches)
+    if not rows.size:
+        raise InvalidInput("wrench", f"shape {rows.shape} given: no case; give one (6,) or more.")
+    W = check_load_rows(arm, rows, len(np.atleast_1d(rows))).at_tip
     return tuple(np.atleast_2d(W)), None if W.ndim == 1 else names or range(len(W))
 
 

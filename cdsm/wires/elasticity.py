@@ -209,8 +209,9 @@ class Elasticity(Plotted):
             few = bool(F.min() < self.low)
             many = bool(F.max() > self.high)
             bounds = [f"a minimum of {rounded(self.low, up=True)} N or more"] if few else []
-            highest = rounded(self.high, up=False)
-            bounds += [f"a maximum of {highest} N or less, and a minimum below it"] if many else []
+            if many:
+                highest = rounded(self.high, up=False)
+                bounds.append(f"a maximum of {highest} N or less, and a minimum below it")
             slack = "; slack_below() (in ARM.toml: slack_below = true) continues one to 0 N" * few
             raise ElasticityRangeError(
                 f"outside the domain {self._span} of the elasticity. Give {' and '.join(bounds)}, "

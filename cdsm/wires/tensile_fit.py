@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import checked_quantity, number_array, scalar
+from cdsm.support.validation import checked_quantity, interval, number_array, scalar
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import TabulatedElasticity
@@ -195,10 +195,7 @@ def fit_tensile_test(
     length = checked_quantity("gauge_length", gauge_length, "length")
     if u.ndim != 1 or u.shape != F.shape:
         raise InvalidInput("force", f"shapes {u.shape} and {F.shape} given; a point needs both.")
-    limits = np.asarray(between)
-    if limits.shape != (2,) or limits.dtype.kind not in "iuf" or not limits[0] < limits[1]:
-        raise InvalidInput("between", f"{between!r} given; give (low, high) in N, low below high.")
-    points = loading(u / length, F, between)
+    points = loading(u / length, F, interval("between", between, "N"))
     strain = points.strain
     pull = points.force
     notes = points.notes

@@ -23,6 +23,7 @@ WRONG: tuple[tuple[dict[str, Any], str], ...] = (
     ),
     ({"tension_std": -0.5}, "tension_std: -0.5 given for cable1_1; .* not negative"),
     ({"tension_std": 0.0}, "tension_std: 0 given for cable1_1; a load cell is not exact"),
+    ({"tension_std": 1e-300}, "tension_std: 1e-300 given for cable1_1; a load cell is not exact"),
     ({"tension_std": [0.5, 0.5]}, r"tension_std: shape \(2,\) given; give one number, or \(12,\)"),
     ({"tension_std": np.nan}, "tension_std: nan; finite numbers"),
     ({"angle_std": -1e-3}, "angle_std: -0.001 given for joint1_1; .* not negative"),
@@ -34,6 +35,8 @@ WRONG: tuple[tuple[dict[str, Any], str], ...] = (
     ({"links": {"tool0": "forces"}}, r"links\['tool0'\]: 'forces' given; give .force., .moment."),
     ({"links": {"tool0": [0, 6]}}, r"links\['tool0'\]: \[0, 6\] given"),
     ({"links": {"tool0": [0, True]}}, r"links\['tool0'\]: \[0, True\] given"),
+    ({"links": {"tool0": np.zeros((2, 2))}}, r"links\['tool0'\]: \[\[0.0, 0.0\], .* given"),
+    ({"links": {"tool0": np.array(5.0)}}, r"links\['tool0'\]: 5.0 given"),
     ({"links": {"tool0": []}}, r"links\['tool0'\]: \[\] given"),
     ({"links": {"tool0": ["fx", 0]}}, r"links\['tool0'\]: \['fx', 0\] names a component twice"),
     (

@@ -109,10 +109,20 @@ def test_what_is_wrong_is_named() -> None:
     given: Any = {"tension_std": 0.5, "start": Q}
     for more, said in (
         ({"rest_lengths": wire[1:]}, r"rest_lengths: shape \(11,\) given"),
-        ({"rest_lengths": wire, "rest_length_std": 0.0}, "rest_length_std: 0 m given"),
+        (
+            {"rest_lengths": wire, "rest_length_std": 0.0},
+            "rest_length_std: 0 given for cable1_1; a wire is not",
+        ),
         ({"points": {"link9": (0, 0, 0)}}, "no link is called 'link9'"),
         ({"points": {"link2": (0, 0)}}, r"points\['link2'\]: shape \(2,\) given"),
         ({"points": {"link2": (0, 0, 0)}, "point_std": 0.0}, "point_std: 0 m given"),
+        ({"rest_lengths": wire, "rest_length_std": [1e-5] * 3}, r"rest_length_std: shape \(3,\)"),
+        ({"rest_lengths": wire, "rest_length_std": "1"}, "rest_length_std: holds <U1 entries"),
+        ({"rest_lengths": wire, "rest_length_std": 1e-300}, "rest_length_std: 1e-300 given for"),
+        ({"rest_length_std": 1e-5}, "rest_length_std: is of rest_lengths, which are not given"),
+        ({"point_std": 1e-3}, "point_std: is of points, which are not given"),
+        ({"points": [0, 0, 0]}, r"points: \[0, 0, 0\] given; give a dict of positions"),
+        ({"points": ()}, r"points: \(\) given; give a dict"),
         ({"start": Q[1:]}, r"start: shape \(7,\) given"),
         ({"sliding": 3}, "sliding: 3 given"),
         ({"tension_std": -1.0}, "tension_std: -1 given for cable1_1"),

@@ -26,6 +26,7 @@ ALONE: dict[str, tuple[dict[str, Any], str]] = {
     "in mm": ({"cables": {"cable1_1": 12e3}}, "radius of cable1_1: 12000 m given"),
     "negative": ({"stiffness": -5.0}, "motor 'm': stiffness: -5 N m/rad given; 1e-09 to 1e"),
     "none": ({"stiffness": 0.0}, r"0 N m/rad holds no angle; give control='torque'\."),
+    "no number": ({"stiffness": np.zeros(2)}, r"motor 'm': stiffness: shape \(2,\) given; one"),
     "both": ({"stiffness": 5.0, "control": "torque"}, "a motor with control='torque' has none"),
     "control": ({"control": "force"}, "no control is called 'force'.* Known: position, torque"),
     "name": ({"name": ""}, "name"),
@@ -41,6 +42,9 @@ def test_a_faulty_motor_is_refused(case: str) -> None:
 
 OTHER = cdsm.Motor("n", {"cable2_1": 0.01})
 OF_ARM: dict[str, tuple[Any, str]] = {
+    "None": (None, "motors: None given; a list or tuple of Motor is needed"),
+    "no list": ({}, "motors: {} given; a list or tuple of Motor is needed"),
+    "array": (np.zeros(2), "motors: .* given; a list or tuple of Motor is needed"),
     "unknown": (
         [cdsm.Motor("m", {"cable1_7": 0.01})],
         "no cable of motor 'm' is called 'cable1_7'; did you mean",

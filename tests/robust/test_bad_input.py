@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,23 @@ def stiffness(*args: Any, pose: cdsm.Posture = POSE) -> Callable[[], object]:
     return lambda: cdsm.stiffness(pose, *args)
 
 
+def read(**options: Any) -> Callable[[], object]:
+    return lambda: cdsm.Manipulator.read("examples/arm.toml", **options)
+
+
+def fit(**options: Any) -> Callable[[], object]:
+    return lambda: cdsm.fit_spring([0.1, 0.2, 0.3], [1.0, 1.8, 2.4], **options)
+
+
+def measured(**options: Any) -> Callable[[], object]:
+    return lambda: cdsm.Measurement(1.0, "z", (0.1,), std=0.1, **options)
+
+
+def swept(**options: Any) -> Callable[[], object]:
+    return lambda: cdsm.sweep(ARM, POSE.q[None], **options)
+
+
+PULLEY = partial(cdsm.Pulley, "link1", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.01)
 THREE = except_at(C, 2, 3.0, 9.0)
 ABOVE, BELOW = except_at(15, 14, 900.0, 50.0), cdsm.distribute_tension(STRAND_POSE)
 CASES: dict[str, tuple[Callable[[], object], str]] = {
@@ -134,6 +152,24 @@ CASES: dict[str, tuple[Callable[[], object], str]] = {
         ("no way", lambda: K.along((0.0, 0.0, 0.0)), "direction: .*zero vector"),
         ("way of two", lambda: K.shares((1.0, 0.0)), r"direction: .*shape \(2,\)"),
         ("term", lambda: K.pseudoinverse("activ"), "'activ'.*did you mean 'active'?.*passive"),  # type: ignore[arg-type]
+        ("cables None", lambda: ARM.with_cables(None), "cables: none given"),  # type: ignore[arg-type]
+        ("pushed wire", lambda: STEEL.strain(-1.0), "-1 N: outside the domain .* minimum of 0 N"),
+        ("file a number", lambda: cdsm.Manipulator.read(3), "path: 3 given; the path of a file"),  # type: ignore[arg-type]
+        ("changes", read(changes=[1]), r"changes: \[1\] given; give a dict of values by keys"),
+        ("sheath", lambda: cdsm.Sheath(0.1, pieces=10**9), "pieces: 10{9} given; .* 1 to 1000"),
+        ("groove", lambda: PULLEY(groove=EIGHTHS), "groove: .*True or False is needed"),
+        ("spring ends", fit(between=[[1], [2, 3]]), "between: is not an array of numbers"),
+        (
+            "spring way",
+            fit(between=(2.0, 1.0)),
+            r"between: \(2.0, 1.0\) given; .* in rad, low below",
+        ),
+        ("assembly", lambda: ARM.assemble(POSE, [[1.0], [2.0, 3.0]]), "tension: is not an array"),
+        ("bound of a test", measured(minimum=[[1.0], [2.0, 3.0]]), "minimum: is not an array"),
+        ("cases None", swept(wrench=None), "wrench: holds object entries"),
+        ("no case", swept(wrench=np.zeros((0, 6))), r"wrench: shape \(0, 6\) given: no case"),
+        ("a case", swept(wrench=5.0), r"wrench: shape \(\) given"),
+        ("store", swept(store=np.zeros(2)), "path: .* given; the path of a file is needed"),
         # what no machine has is refused with the range
         ("huge gravity", manipulator(STEEL, gravity=(0.0, 0.0, -9810.0)), "up to 1000 m/s²"),
         ("huge q", lambda: ARM.at(np.full(6, 1e300), check_limits=False), r"q: .* up to 1e\+15"),
@@ -152,6 +188,7 @@ KINDS = {
     "heavy link": cdsm.GeometryError,
     "fixed too high": cdsm.InfeasibleTension,
     "a path": cdsm.FileError,
+    "pushed wire": cdsm.ElasticityRangeError,
     "above the law": cdsm.ElasticityRangeError,
     "below the law": cdsm.ElasticityRangeError,
 }
