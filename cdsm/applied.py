@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -325,6 +325,25 @@ def all_loads(arm: ComputedArm, wrench: Applied) -> Loads:
     if isinstance(wrench, Loads):
         return Loads((*own, *wrench.loads))
     return Loads((*own, TipLoad(wrench)), arm.own_places)
+
+
+class PlacedForce(NamedTuple):
+    """A force on a link, where it acts at a posture."""
+
+    link: str
+    place: Array  # (3,) [m]
+    force: Array  # (3,) [N], not zero
+
+
+def placed_forces(pose: Posture, applied: Applied) -> list[PlacedForce]:
+    """Return the forces on an arm, those that belong to it too, for arrows; the tip's is first."""
+    loads = all_loads(pose.arm, applied)
+    placed = [PlacedForce(pose.arm.tip_link, pose.tip[:3, 3], loads.tip_wrench[:3])]
+    placed += [
+        PlacedForce(load.at.link, load.at.position(pose), load.wrench[:3])
+        for load in loads.on_links
+    ]
+    return [load for load in placed if load.force.any()]
 
 
 def required_torque(pose: Posture, wrench: Applied) -> Array:

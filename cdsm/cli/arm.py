@@ -239,6 +239,8 @@ def view(
             link=None if link == robot.tip_link else link,
             angles=motion.angles,
             tips=motion.tips,
+            file=arm,
+            changes=options.changes_of(changes),
         ) as page:
             head, numbers = header(robot, [minimum], "included")
             facts: Json = {"name": robot.name, "url": page.url}

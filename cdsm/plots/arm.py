@@ -14,8 +14,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import FancyArrowPatch, Polygon
 from numpy.typing import ArrayLike
 
-from cdsm.applied import Applied, PointLoad, all_loads, tip_part
+from cdsm.applied import Applied, PlacedForce, placed_forces
 from cdsm.errors import InvalidInput
+from cdsm.loads import LoadsLike, has_loads, loads_of
+from cdsm.manipulator import Manipulator
 from cdsm.plots import style
 from cdsm.plots.projection import VIEW, Drawing
 from cdsm.plots.style import MM, Panels
@@ -43,11 +45,10 @@ class Scene(NamedTuple):
 
     pose: Posture
     tension: Array | None  # F (C,) [N]
-    force: Array  # at the tip (3,) [N]
+    forces: list[PlacedForce]
     compliance: Array | None  # of the tip (6, 6), None if not asked for or not stable
     warnings: tuple[str, ...]  # why numbers mean little
     before: Posture | None  # drawn pale below
-    hung: tuple[PointLoad, ...] = ()  # loads on links
 
 
 @style.styled
@@ -60,7 +61,7 @@ def plot_arm(
     view: ArrayLike = VIEW,
     limits: tuple[float, float] | None = None,
     bar: bool = True,
-    force: ArrayLike | None = None,
+    force: LoadsLike | None = None,
     scale: float | None = None,
     names: bool = False,
     triad: bool = True,
@@ -83,8 +84,9 @@ def plot_arm(
         view: Elevation and azimuth of the eye [deg].
         limits: Tensions [N] at the ends of the colours; None: the smallest and the largest.
         bar: Whether to draw the colour bar of the tensions.
-        force: Force (3,) [N] at the tip, drawn as an arrow with its size; None: that of the
-            stiffness or the equilibrium.
+        force: Force (3,) [N] at the tip, or loads on links as for
+            :func:`~cdsm.distribute_tension`, drawn as arrows with their sizes; None: those of the
+            stiffness or the equilibrium. The loads that belong to the arm are always drawn.
         scale: By which displacements of the outline are enlarged; None: a round number.
         names: Whether to write the names of the cables at their ends.
         triad: Whether to draw the base axes.
@@ -191,7 +193,7 @@ def plot_arms(
 
 
 def _scene(
-    pose: object, tension: object, stiffness: object, force: ArrayLike | None = None
+    pose: object, tension: object, stiffness: object, force: LoadsLike | None = None
 ) -> Scene:
     """Check the arguments of :func:`plot_arm`, and return what they ask to draw."""
     before = compliance = None
@@ -223,11 +225,13 @@ def _scene(
     values = None
     if tension is not None:
         values = vector("tension", np.asarray(tension), len(pose.arm.cables), "one [N] per cable")
-    load = tip_part(applied)[:3]
-    if force is not None:
-        load = vector("force", force, 3, "a force [N] in base axes")
-    hung = all_loads(pose.arm, applied).on_links
-    return Scene(pose, values, load, compliance, warnings, before, hung)
+    if has_loads(force):
+        applied = loads_of(pose.arm, force, "force")
+    elif force is not None:
+        tip = vector("force", force, 3, "a force [N] in base axes")  # type: ignore[arg-type]
+        applied = np.concatenate([tip, np.zeros(3)])
+    forces = placed_forces(pose, applied)
+    return Scene(pose, values, forces, compliance, warnings, before)
 
 
 def _question(scene: Scene) -> str:
@@ -374,20 +378,24 @@ def draw_force(drawing: Drawing, scene: Scene) -> None:
     """Draw the tip, and the forces on it and on links as arrows with their sizes."""
     tip = scene.pose.tip[:3, 3]
     drawing.ax.plot(*drawing.flat(tip), "o", ms=2.5, color=style.INK, zorder=6.5, gid="tip")
-    length = scene.pose.arm.length
-    _draw_arrow(drawing, tip, scene.force, length, "force")
-    for load in scene.hung:
-        place = load.at.position(scene.pose)
-        _draw_arrow(drawing, place, load.wrench[:3], length, f"force:{load.at.link}")
+    for load in scene.forces:
+        at_tip = load.link == scene.pose.arm.tip_link
+        _draw_arrow(drawing, load, scene.pose, "force" if at_tip else f"force:{load.link}")
 
 
-def _draw_arrow(drawing: Drawing, place: Array, force: Array, length: float, gid: str) -> None:
-    """Draw a force (3,) [N] on a place (3,) [m] of an arm of this length, unless it is zero."""
-    size = float(np.linalg.norm(force))
-    if size == 0.0:
-        return
-    start = drawing.flat(place)
-    end = drawing.flat(place + _ARROW * length * force / size)
+def arrow_of(load: PlacedForce, arm: Manipulator) -> tuple[Array, Array, str]:
+    """Return both ends (3,) [m] of the arrow of a force, and its size in words.
+
+    All arrows have one length, so that none hides behind a disk.
+    """
+    size = float(np.linalg.norm(load.force))
+    end = load.place + _ARROW * arm.length * load.force / size
+    return load.place, end, f"{size:.3g} N"
+
+
+def _draw_arrow(drawing: Drawing, load: PlacedForce, pose: Posture, gid: str) -> None:
+    *ends, size = arrow_of(load, pose.arm)
+    start, end = map(drawing.flat, ends)
     look: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 7, "lw": 1.4, "zorder": 7}
     look |= {"color": style.PURPLE, "shrinkA": 0, "shrinkB": 0}
     arrow = FancyArrowPatch(tuple(start), tuple(end), **look)
@@ -396,7 +404,7 @@ def _draw_arrow(drawing: Drawing, place: Array, force: Array, length: float, gid
     right = end[0] >= start[0]
     look = {"fontsize": 7, "color": style.DARK[style.PURPLE], "va": "center", "zorder": 8}
     look |= {"xytext": (3 if right else -3, 0), "textcoords": "offset points"}
-    drawing.ax.annotate(f"{size:.3g} N", tuple(end), ha="left" if right else "right", **look)
+    drawing.ax.annotate(size, tuple(end), ha="left" if right else "right", **look)
 
 
 def _scale(longest: float, length: float) -> tuple[float, float]:

@@ -224,6 +224,18 @@ def verbatim(toml: str) -> float:
     return value
 
 
+def set_texts(changes: Mapping[str, Any], where: str = "") -> list[str]:
+    """Return changes of a file, which :func:`laid_over` lays, as texts ``KEY=VALUE`` of --set."""
+    texts = list[str]()
+    for key, value in changes.items():
+        if isinstance(value, Mapping) and value:
+            texts += set_texts(value, f"{where}{key}.")
+        else:
+            written = toml_text({"value": value}).partition("=")[2]
+            texts.append(f"{where}{key}={written.strip()}")
+    return texts
+
+
 def one_line_each(tables: Iterable[Mapping[str, Any]]) -> float:
     """Return a value that :func:`toml_text` writes as an array, each of its tables in one line."""
     lines = [", ".join(toml_text(table).splitlines()) for table in tables]

@@ -8,15 +8,16 @@ from __future__ import annotations
 import contextlib
 import logging
 import math
+import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent import futures
 from typing import TYPE_CHECKING, Any, Self, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import CdsmError, need
+from cdsm.errors import CdsmError, InvalidInput, listed, need
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path import checked_path
 from cdsm.status import Status
@@ -27,6 +28,7 @@ from cdsm.view.history import History
 from cdsm.view.panel import Panel, loadable_links
 from cdsm.view.path_player import Player, tips_of
 from cdsm.view.saving import (
+    Source,
     command_text,
     draw_picture,
     file_name,
@@ -59,6 +61,8 @@ def serve(
     link: str | None = None,
     angles: ArrayLike | None = None,
     tips: ArrayLike | None = None,
+    file: str | os.PathLike[str] | None = None,
+    changes: Mapping[str, Any] | None = None,
 ) -> View:
     """Serve a live view of an arm: sliders, a 3D picture, and the stiffness.
 
@@ -85,6 +89,9 @@ def serve(
         link: Link on which it acts: at the centre of its disk, or its frame. None: at the tip.
         angles: A path to play, as joint angles (S, nv) [rad]; the arm starts at the first.
         tips: A path to play, as tip positions (S, 3) [m]; give only one kind of path.
+        file: The file from which the arm was read, and ``changes`` as for
+            :meth:`Manipulator.read`: the lines that the page saves have both.
+        changes: Values that were laid over the keys of the file.
 
     Returns:
         The running view. ``url`` is the address of its page, ``shown`` its present results;
@@ -109,7 +116,7 @@ def serve(
         minimum=checked_quantity("minimum", minimum, "tension", zero=True),
         maximum=checked_quantity("maximum", maximum, "tension", infinite=True),
         force=vector("force", force, 3, "force [N], base axes"),
-        link="" if link in (None, arm.tip_link) else one_of("link", link, loadable_links(arm)),
+        link="" if link in (None, arm.tip_link) else _checked_link(arm, link),
         pull=np.zeros(len(arm.cables)) if pulled else None,
     )
     with contextlib.redirect_stdout(None):  # viser prints addresses
@@ -119,7 +126,7 @@ def serve(
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(_PANEL)
-        view = View(arm, start, server)
+        view = View(arm, start, server, Source(os.fspath(file or ""), changes or {}))
         if path is not None and route is not None:
             view.add_path(path, route)
     except BaseException:
@@ -128,12 +135,26 @@ def serve(
     return view
 
 
+def _checked_link(arm: Manipulator, link: object) -> str:
+    """Return the link on which the force acts; InvalidInput if it would move nothing there."""
+    name = one_of("link", link, arm.body.link_names)
+    known = loadable_links(arm)
+    if name not in known:
+        where = listed(["the tip", *(each for each in known)], 6)
+        problem = f"{name} given, but no joint moves the place where a force on it would act, or it"
+        raise InvalidInput("link", f"{problem} has no disk; choose {where}.")
+    return name
+
+
 @final
 class View:
     """Running live view of ``arm``, made by :func:`serve`. Close it, or use it in ``with``."""
 
-    def __init__(self, arm: Manipulator, start: Setting, server: viser.ViserServer) -> None:
+    def __init__(
+        self, arm: Manipulator, start: Setting, server: viser.ViserServer, source: Source
+    ) -> None:
         self.arm = arm
+        self._source = source
         self._server = server
         self._closed = threading.Event()
         self._moved = threading.Event()
@@ -144,7 +165,7 @@ class View:
         self._player: Player | None = None
         self._panel = Panel(server.gui, arm, start, self._request)
         self._history = History(self._panel.values)
-        self._scene = Scene(server, arm, self._panel.largest_force)
+        self._scene = Scene(server, arm)
         self._handle = TipHandle(server.scene, arm, self._request)
         self._refresh()
         self._scene.begin(server.initial_camera, self._shown, np.empty((0, 3)))
@@ -208,6 +229,7 @@ class View:
         self._moved.clear()
         try:
             self._handle.follow(self._panel)
+            self._panel.fit_forces()
             self._history.note(self._panel.values)
             self._put(show(self.arm, self._panel.setting))
         except Exception as error:  # a bug must not leave outdated numbers on the page
@@ -228,7 +250,8 @@ class View:
         """Show what takes longer, once no control has moved for a while."""
         if self._moved.wait(_REST) or shown is not self._shown:
             return
-        code = f"{python_text(self.arm, shown.setting)}\n\n{command_text(self.arm, shown.setting)}"
+        command = command_text(self.arm, shown.setting, self._source)
+        code = f"{python_text(self.arm, shown.setting)}\n\n{command}"
         curve = None
         with contextlib.suppress(CdsmError):
             axis = self._panel.curve.axis.value
@@ -264,7 +287,7 @@ class View:
     def _send(self, client: viser.ClientHandle, what: str) -> None:
         if what == "Posture":
             numbers = said_numbers(self._shown)
-            content = posture_text(self.arm, self._shown, numbers).encode()
+            content = posture_text(self.arm, self._shown, self._source, numbers).encode()
             client.send_file_download(
                 file_name(self.arm, "_posture.py"), content, save_immediately=True
             )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, final
 
 import numpy as np
 
+from cdsm.dead_loads import point_on
 from cdsm.manipulator import Manipulator
 from cdsm.plots.style import MM
 from cdsm.support.format import JointUnits
@@ -39,8 +40,8 @@ _LEAST: Final = "Lower bound of all tensions; where the arm asks for more, that 
 class Panel:
     """Panel of the page: controls that set the arm, and text about the arm.
 
-    The sliders of the force end at ± ``largest_force`` [N]. ``changed`` is called, in any thread,
-    when a control has changed.
+    The sliders of the force end at ± ``largest_force`` [N], which :meth:`fit_forces` sets.
+    ``changed`` is called, in any thread, when a control has changed.
     """
 
     def __init__(
@@ -54,7 +55,9 @@ class Panel:
         self._arm = arm
         self._start = start
         self._changed = changed
-        self.largest_force = max(force_range(arm, start), float(abs(start.force).max()))
+        self._ranges = {start.link: force_range(arm, start)}  # by link
+        self._fitted = start.link
+        self.largest_force = max(self._ranges[start.link], float(abs(start.force).max()))
         low, high, applied = tension_range(arm, start)
         self.tension_ends = (low, high)
         self._head = gui.add_html("")
@@ -143,6 +146,21 @@ class Panel:
         q = self._unit * [joint.value for joint in self.joints]
         return replace(pushed, q=q, minimum=minimum, sag=self._sag.value)
 
+    def fit_forces(self) -> None:
+        """Let the sliders of the force end at what the arm holds at the chosen link, or later."""
+        setting = self.setting
+        link = setting.link
+        if link == self._fitted:
+            return
+        self._fitted = link
+        if link not in self._ranges:
+            self._ranges[link] = force_range(self._arm, replace(self._start, link=link))
+        self.largest_force = max(self._ranges[link], float(abs(setting.force).max()))
+        step, digits = _step(2.0 * self.largest_force)
+        for slider in self._load[1:]:
+            slider.min, slider.max = -self.largest_force, self.largest_force
+            slider.step, slider.precision = step, digits
+
     def update(self, shown: Shown, scene: Scene, remark: str) -> None:
         """Write about the results ``shown``, with a ``remark``; take away what comes later."""
         self._head.content = texts.head_text(shown, remark)
@@ -180,12 +198,10 @@ class Panel:
         hint: str | None = None,
     ) -> viser.GuiSliderHandle[float]:
         """Add a slider; its ends are rounded inwards to steps, since no limit may be passed."""
-        if step == 0.0:
-            step = 10.0 ** math.floor(math.log10((high - low) / _STEPS)) if high > low else 1.0
-        digits = max(0, round(-math.log10(step)))
+        step, digits = _step(high - low, step)
         low = min(round(math.ceil(low / step - ROUND) * step, digits), initial)
         high = max(round(math.floor(high / step + ROUND) * step, digits), initial)
-        slider = self._gui.add_slider(label, low, high, round(step, digits), initial, hint=hint)
+        slider = self._gui.add_slider(label, low, high, step, initial, hint=hint)
         slider.precision = digits  # the box beside the slider has room for no more
         slider.on_update(lambda _: self._changed())
         return slider
@@ -196,10 +212,19 @@ class Panel:
         return switch
 
 
+def _step(width: float, step: float = 0.0) -> tuple[float, int]:
+    """Return the step of a slider of a ``width``, unless one is given, and its decimal digits."""
+    if step == 0.0:
+        step = 10.0 ** math.floor(math.log10(width / _STEPS)) if width > 0.0 else 1.0
+    digits = max(0, round(-math.log10(step)))
+    return round(step, digits), digits
+
+
 def loadable_links(arm: Manipulator) -> list[str]:
     """Return the names of the links, but the tip's, on which a force may act.
 
-    Of a generated arm they are the links with disks.
+    Of a generated arm they are the links with disks. A force on a point that no joint moves, such
+    as the centre of the first joint, would do nothing.
     """
     body = arm.body
     disks = {disk.link for disk in arm.geometry.disks} if arm.is_serpentine else None
@@ -209,4 +234,5 @@ def loadable_links(arm: Manipulator) -> list[str]:
         if name != arm.tip_link
         and body.joints_to(body.locate(name)[0])
         and (disks is None or name in disks)
+        and not point_on(body, arm.definition.geometry, name, None).still
     ]

@@ -40,9 +40,10 @@ def tension_range(arm: Manipulator, start: Setting) -> tuple[float, float, float
 def force_range(arm: Manipulator, start: Setting) -> float:
     """Return the end [N] of the sliders of the force: twice what the arm holds along y or z.
 
-    Where no bound of a tension limits that, it is the force that moves the tip by 5 % of the arm's
-    length, or twice the one under which the arm buckles, if that is less.
+    Where no bound of a tension limits that, it is the force that moves the place where it acts by
+    5 % of the arm's length, or twice the one under which the arm buckles, if that is less.
     """
+    link = start.link or None
     try:
         if start.pull is not None:
             source: Any = cdsm.forward_statics(arm, pull=start.pull)
@@ -50,11 +51,12 @@ def force_range(arm: Manipulator, start: Setting) -> float:
         else:
             pose = arm.at(start.q)
             sides = "y", "-y", "z", "-z"
-            held = [cdsm.payload(pose, u, start.minimum, start.maximum) for u in sides]
+            bounds = start.minimum, start.maximum
+            held = [cdsm.payload(pose, u, *bounds, link=link) for u in sides]
             source = cdsm.stiffness(pose, cdsm.distribute_tension(pose, start.minimum))
         within = _proper(2.0 * case.limits["tension"] for case in held)
         if not within:
-            within = _proper(_SAG_SHOWN * arm.length * source.along(u) for u in "yz")
+            within = _proper(_SAG_SHOWN * arm.length * source.along(u, link) for u in "yz")
             buckling = _proper(2.0 * case.following.force for case in held if case.following)
             within = [min(max(within, default=_FORCE), max(buckling, default=math.inf))]
     except CdsmError:

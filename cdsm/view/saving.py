@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import re
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final, final
 
 import numpy as np
 
@@ -16,11 +17,44 @@ from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import plot_arm
 from cdsm.plots.projection import VIEW
 from cdsm.plots.style import MM, save_figure
+from cdsm.status import Status
 from cdsm.support.format import JointUnits
+from cdsm.support.records import set_texts
 from cdsm.view.state import Setting, Shown
 
 if TYPE_CHECKING:
     import viser
+
+
+@final
+@dataclass(frozen=True)
+class Source:
+    """Where an arm comes from, for the lines that compute the same: its file, if it has one."""
+
+    file: str = ""
+    changes: Mapping[str, Any] = field(default_factory=dict)  # laid over the keys of the file
+
+    @property
+    def arguments(self) -> str:
+        """The file and the changes, as arguments of a command."""
+        changed = (f" --set {shlex.quote(text)}" for text in set_texts(self.changes))
+        return shlex.quote(self.file or _FILE) + "".join(changed)
+
+    @property
+    def python(self) -> str:
+        """Python that reads the arm."""
+        changed = f", changes={dict(self.changes)!r}" if self.changes else ""
+        return f"cdsm.Manipulator.read({self.file or _FILE!r}{changed})"
+
+    @property
+    def remark(self) -> str:
+        """What the reader of the lines has to do."""
+        if self.file:
+            return "run it where it was started"
+        return f"put the name of your file for {_FILE}"
+
+
+_FILE: Final = "ARM.toml"
 
 
 def draw_picture(shown: Shown, view: tuple[float, float] = VIEW) -> bytes | None:
@@ -28,11 +62,15 @@ def draw_picture(shown: Shown, view: tuple[float, float] = VIEW) -> bytes | None
     pose = shown.posture
     if pose is None:
         return None
+    setting = shown.setting
+    force = setting.wrench if setting.link else setting.force
     if shown.rest is not None:
         panel = plot_arm(shown.rest, view=view)
-    else:
-        K = shown.stiffness
-        panel = plot_arm(pose, shown.tension, K, view=view, warnings=K is not None)
+    elif (K := shown.stiffness) is not None:
+        panel = plot_arm(pose, shown.tension, K, view=view)
+    else:  # an invalid force has no arrow
+        none = shown.status is Status.INVALID_INPUT
+        panel = plot_arm(pose, shown.tension, view=view, force=None if none else force)
     with TemporaryDirectory() as folder:
         return save_figure(panel, Path(folder) / "arm.svg").read_bytes()
 
@@ -51,29 +89,32 @@ def file_name(arm: Manipulator, ending: str) -> str:
     return re.sub(r"[^\w.-]+", "_", arm.name) + ending
 
 
-def posture_text(arm: Manipulator, shown: Shown, numbers: Iterable[str] = ()) -> str:
+def posture_text(
+    arm: Manipulator, shown: Shown, source: Source, numbers: Iterable[str] = ()
+) -> str:
     """Write a program that computes what is shown; its first lines have the command for it.
 
     ``numbers`` are the lines that it has to give again.
     """
-    head = [f"{arm.name} as it stood in `cdsm view`; put the name of your file for ARM.toml"]
-    head += [command_text(arm, shown.setting), *numbers]
+    head = [f"{arm.name} as it stood in `cdsm view`; {source.remark}"]
+    head += [command_text(arm, shown.setting, source), *numbers]
     return "\n".join(
         [
             *(f"# {line}" for text in head for line in text.splitlines()),
             "",
             "import cdsm",
             "",
-            'arm = cdsm.Manipulator.read("ARM.toml")',
+            f"arm = {source.python}",
             python_text(arm, shown.setting),
             "",
         ]
     )
 
 
-def command_text(arm: Manipulator, setting: Setting) -> str:
+def command_text(arm: Manipulator, setting: Setting, source: Source) -> str:
     """Write the command that computes the numbers."""
-    parts = ["cdsm stiffness ARM.toml"]
+    command = "stiffness"
+    parts = list[str]()
     force = setting.force.any()
     if setting.pull is not None:
         parts.append(f"--pull={_joined(MM * setting.pull, ',')}")
@@ -84,11 +125,11 @@ def command_text(arm: Manipulator, setting: Setting) -> str:
         if math.isfinite(setting.maximum):
             parts.append(f"--maximum={setting.maximum:.12g}")
         if setting.sag and force:
-            parts[0] = "cdsm weigh ARM.toml"
+            command = "weigh"
     if force:
         at = f"@{setting.link}" if setting.link else ""
         parts.append(shlex.quote(f"--load={_joined(setting.force, ',')}{at}"))
-    return " ".join(parts)
+    return " ".join([f"cdsm {command} {source.arguments}", *parts])
 
 
 def python_text(arm: Manipulator, setting: Setting) -> str:

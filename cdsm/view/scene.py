@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cdsm.errors import GeometryError
 from cdsm.manipulator import Manipulator
+from cdsm.plots.arm import arrow_of
 from cdsm.plots.style import round_number
 from cdsm.status import Status
 from cdsm.support.values import Array
@@ -36,7 +37,6 @@ TOUCHING: Final[Color] = (213, 94, 0)
 _CELL: Final[Color] = (235, 235, 235)
 _SECTION: Final[Color] = (215, 215, 215)
 _NOTHING: Final = np.zeros((1, 2, 3))
-_ARROW = 0.5  # length of the arrow of the largest force, over the arm's length
 _SIDE: Final = np.array([0.3, -2.7, 1.1])  # from the arm to the first camera, over its radius
 _FIELD = math.pi / 4.0  # vertical angle of the camera
 _SQUARE = 1.05  # width over height of a window below which the arm would not fit
@@ -46,18 +46,17 @@ _WIDE = 3.5  # of a cable [pixels]
 
 
 class Scene:
-    """3D scene with an arm in a viser server; ``largest_force`` [N] has the longest arrow.
+    """3D scene with an arm in a viser server.
 
     Pinocchio's visualiser draws links with shapes in the URDF. Other links, or all links if a mesh
     cannot be read, are drawn as sticks between joints.
     """
 
-    def __init__(self, server: viser.ViserServer, arm: Manipulator, largest_force: float) -> None:
+    def __init__(self, server: viser.ViserServer, arm: Manipulator) -> None:
         self._arm = arm
         self._scene = server.scene
         length = arm.length
         self.cell = round_number(length / 5.0)  # size of a cell of the grid [m]
-        self.force_scale = _ARROW * length / largest_force  # length of the arrow per force [m/N]
         self._draw_surroundings()
         # without a posture, what is below these frames is hidden
         frames = [self._scene.add_frame(name, show_axes=False) for name in ("/arm", "/cables")]
@@ -89,8 +88,8 @@ class Scene:
             opacity=0.65,
             side="front",  # the two sides of a flat ellipsoid would flicker
         )
-        self._force = self._scene.add_arrows(
-            "/force",
+        self._forces = self._scene.add_arrows(
+            "/forces",
             _NOTHING,
             FORCE,
             shaft_radius=0.006 * length,
@@ -98,6 +97,9 @@ class Scene:
             head_length=0.04 * length,
         )
         self._label = self._scene.add_label("/status", "", anchor="bottom-center")
+        most = len(arm.own_loads) + 1
+        sizes = (f"/forces/{i}" for i in range(most))
+        self._sizes = [self._scene.add_label(name, "", visible=False) for name in sizes]
         self._names = [self._scene.add_label(f"/names/{i}", "", visible=False) for i in names]
 
     def begin(self, camera: viser.InitialCameraConfig, shown: Shown, path: Array) -> None:
@@ -107,7 +109,8 @@ class Scene:
             self._thin("/path", points=lines, colors=FORCE, thickness=1.5, visible=True)
         pose = shown.posture
         length = self._arm.length
-        points = np.concatenate([path, *(pose.bones if pose else [np.eye(2, 3)])])
+        drawn = [*pose.bones, *pose.cable_paths] if pose else [np.eye(2, 3)]
+        points = np.concatenate([path, *drawn])
         low = points.min(axis=0)
         high = points.max(axis=0)
         radius = max(float(np.linalg.norm(high - low)), length) / 2.0
@@ -136,14 +139,10 @@ class Scene:
     def update(self, shown: Shown, names: bool) -> None:
         """Draw the results ``shown``; ``names`` labels all cables."""
         pose = shown.posture
-        force = shown.setting.force
         ellipsoid = shown.ellipsoid
         for frame in self._frames:
             frame.visible = pose is not None
         self._ellipsoid.visible = ellipsoid is not None
-        # an invalid force has no arrow
-        pushed = pose is not None and shown.status is not Status.INVALID_INPUT
-        self._force.visible = pushed and bool(force.any())
         self._label.visible = pose is not None and shown.status is not Status.OK
         shaped = frozenset() if self._shapes is None else self._shapes.rows
         bones, brackets = ([], []) if pose is None else pose.stick_figure(shaped)
@@ -162,6 +161,7 @@ class Scene:
             node.points = np.array(lines if node.visible else _NOTHING, dtype=np.float32)
         for label in self._names:
             label.visible = names and pose is not None
+        self._draw_forces(shown)
         if pose is None:
             return
         if self._shapes is not None:
@@ -176,11 +176,19 @@ class Scene:
         if ellipsoid is not None:
             self._ellipsoid.vertices = ellipsoid.surface.reshape(3, -1).T.astype(np.float32)
         tip = pose.tip[:3, 3]
-        if self._force.visible:
-            start = shown.loaded_point
-            self._force.points = np.array([[start, start + self.force_scale * force]], np.float32)
         self._label.text = shown.heading
         self._label.position = tip + 0.1 * self._arm.length * np.eye(3)[2]
+
+    def _draw_forces(self, shown: Shown) -> None:
+        """Draw all forces on the arm as arrows with their sizes, as its picture has them."""
+        arrows = [arrow_of(load, self._arm) for load in shown.forces]
+        self._forces.visible = bool(arrows)
+        points = [ends for *ends, _ in arrows] or _NOTHING
+        self._forces.points = np.array(points, dtype=np.float32)
+        for i, label in enumerate(self._sizes):
+            label.visible = i < len(arrows)
+            if label.visible:
+                _, label.position, label.text = arrows[i]
 
     def _meshes(self, nodes: Mapping[str, list[str]]) -> dict[str, list[tuple[Any, Any]]]:
         """Return the meshes of each link whose colour can change, with their colours."""

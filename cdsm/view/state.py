@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
-from cdsm.applied import Applied, acts
+from cdsm.applied import Applied, PlacedForce, acts, placed_forces
 from cdsm.errors import CdsmError
 from cdsm.loads import link_point, loads_of
 from cdsm.manipulator import Manipulator
@@ -119,6 +119,14 @@ class Shown:
         """Softest and stiffest directions of the tip, where it is stable."""
         assert self.source is not None
         return principal_stiffness(self.source.compliance[:3, :3])
+
+    @property
+    def forces(self) -> list[PlacedForce]:
+        """The forces on the drawn posture; none without one, or if they are invalid."""
+        pose = self.posture
+        if pose is None or self.status is Status.INVALID_INPUT:
+            return []
+        return placed_forces(pose, loads_of(pose.arm, self.setting.wrench))
 
     @property
     def loaded_point(self) -> Array:

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from cdsm.cable import wires_text
+from cdsm.cable import breaking_forces, largest_share, wires_text
 from cdsm.errors import SingularStiffness
 from cdsm.load_texts import own_loads
 from cdsm.manipulator import Manipulator
@@ -22,7 +22,6 @@ from cdsm.support.format import coordinates, largest_finite, plural, span
 from cdsm.support.values import Array
 from cdsm.view.scene import ELLIPSOID, FORCE, SLIDES, STICKS, TOUCHING, Scene
 from cdsm.view.state import Color, Shown
-from cdsm.wires.ropes import breaking_force
 
 _GOOD: Final = ("#e6f4ee", "#00734f")
 _BAD: Final = ("#b34700", "#fff")
@@ -58,7 +57,8 @@ def about_text(arm: Manipulator) -> str:
     """Write what the arm is: its sizes, wire, gravity and friction."""
     friction = "friction in its holes where motors are locked" if arm.has_friction else ""
     basis = f"wire {wires_text(arm.cables)}; gravity {coordinates(arm.gravity)} m/s²"
-    return box(lines(f"{arm}; {basis}; {friction or 'frictionless'}"))
+    said = [f"{arm}; {basis}; {friction or 'frictionless'}", arm.motors.line]
+    return box(lines("\n".join(filter(None, said))))
 
 
 def head_text(shown: Shown, remark: str = "") -> str:
@@ -84,6 +84,8 @@ def answer_text(shown: Shown, scene: Scene) -> str:
     parts = [_table(_numbers(shown))]
     if shown.posture is not None and (own := own_loads(shown.posture.arm)):
         parts.append(lines("\n".join(own)))
+    if shown.tensions is not None and shown.posture is not None:
+        parts.append(lines(largest_share(shown.posture.arm.cables, shown.tensions)))
     if shown.stiffness is not None:
         parts.append(lines(model_of(shown.stiffness)))
     legend = [f"grid: {MM * scene.cell:g} mm"]
@@ -91,8 +93,8 @@ def answer_text(shown: Shown, scene: Scene) -> str:
         legend.append(f"{_swatch(ELLIPSOID)} {shown.ellipsoid}")
     if shown.posture is not None and shown.setting.force.any():
         where = html.escape(shown.setting.link) or "the tip"
-        size = f"{MM * scene.force_scale:.3g} mm per N"
-        legend.append(f"{_swatch(FORCE)} force at {where}, {size}")
+        size = f"{np.linalg.norm(shown.setting.force):.4g} N"
+        legend.append(f"{_swatch(FORCE)} force at {where}: {size}")
     sticking, sliding = map(len, shown.holes)
     if sticking or sliding:
         marks = _swatch(STICKS), _swatch(SLIDES)
@@ -115,27 +117,37 @@ def tensions_text(shown: Shown) -> str:
     ends = [largest, *low[np.isfinite(low)], *high[high <= _NEAR * largest]]
     top = 1.05 * max(ends) or 1.0
     slack = () if shown.rest is None else shown.rest.slack
-    names = shown.posture.arm.cables.names
-    wide = min(0.62 * max(map(len, names)) + 0.6, _WIDEST)
+    cables = shown.posture.arm.cables
+    names = cables.names
+    shares = F / breaking_forces(cables)
+    room = "7.2em" if np.isnan(shares).all() else "10em"
+    longest = 0.62 * max(map(len, names)) + 0.6
+    wide = min(longest, _WIDEST)
     near = _AT_BOUND * largest
     rows = []
     for i, name in enumerate(names):
         mark = "slack" if name in slack else ""
         mark = mark or ("min" if low[i] > 0.0 and F[i] <= low[i] + near else "")
         mark = mark or ("max" if F[i] >= high[i] - near else "")
-        ticks = [bound / top for bound in (low[i], high[i]) if bound <= top]
+        ticks = [bound / top for bound in (low[i], high[i]) if 0.0 < bound <= top]
         bar = _bar(F[i] / top, shown.cable_colors[i], ticks)
         shade = f"color:{_MARK}" if mark else ""
-        look = f"width:7.2em;text-align:right;white-space:nowrap;{shade}"
+        look = f"width:{room};text-align:right;white-space:nowrap;{shade}"
+        share = "" if math.isnan(shares[i]) else f"{100.0 * shares[i]:.3g} % "
+        written = html.escape(name)
+        if longest > _WIDEST:  # in two lines
+            written = written.replace("_", "_<wbr>")
         rows.append(
             '<div class="tension" style="display:flex;align-items:center;min-height:1.45em">'
             f'<span style="width:{wide:.1f}em;overflow-wrap:anywhere;line-height:1">'
-            f'{html.escape(name)}</span>{bar}<span style="{look}">{F[i]:.4g} N {mark}</span></div>'
+            f'{written}</span>{bar}<span style="{look}">{F[i]:.4g} N {share}{mark}</span></div>'
         )
     bounds = [f"from {span(low)}" * bool(low.any())]
     bounds.append(f"to {span(high)}" * bool(np.isfinite(high).all()))
     said = " ".join(filter(None, bounds))
     rows.append(f"bounds{_swatch_line()}: {said} N" if said else "no bounds")
+    if not np.isnan(shares).all():
+        rows.append(lines("%: of the least breaking force of the rope"))
     return box("".join(rows))
 
 
@@ -234,11 +246,7 @@ def _numbers(shown: Shown) -> Iterator[tuple[str, str, str]]:
         for name, c in (("smallest", tensions.argmin()), ("largest", tensions.argmax())):
             cable = html.escape(pose.arm.cables[c].name)
             swatch = _swatch(shown.cable_colors[c])
-            force = breaking_force(pose.arm.cables[c].elasticity)
-            share = (
-                "" if math.isnan(force) else f" ({100.0 * tensions[c] / force:.3g} % of breaking)"
-            )
-            yield f"{name} tension, {swatch} {cable}", f"{tensions[c]:.4g}", f"N{share}"
+            yield f"{name} tension, {swatch} {cable}", f"{tensions[c]:.4g}", "N"
 
 
 def _table(rows: Iterable[Sequence[str]]) -> str:

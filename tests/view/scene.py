@@ -62,9 +62,21 @@ def shapes(view: View, link: str) -> list[Disk]:
 
 
 def arrow(view: View) -> Array | None:
-    """Start and end (2, 3) [m] of the arrow of the force; None if there is none."""
-    handle = node(view, "/force")
-    return np.array(handle.points, float)[0] if handle.visible else None
+    """Start and end (2, 3) [m] of the first arrow of a force; None if there is none."""
+    return next(iter(arrows(view).values()), None)
+
+
+def arrows(view: View) -> dict[str, Array]:
+    """Start and end (2, 3) [m] of the arrows of all forces by their texts, which stand at ends."""
+    handle = node(view, "/forces")
+    found = {}
+    for i in range(len(view.arm.own_loads) + 1):
+        size = node(view, f"/forces/{i}")
+        if size.visible:
+            found[size.text] = np.array(handle.points, float)[i]
+            np.testing.assert_allclose(size.position, found[size.text][1], atol=1e-6)
+    assert handle.visible == bool(found)
+    return found
 
 
 def ellipsoid(view: View) -> Array | None:

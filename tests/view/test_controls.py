@@ -24,7 +24,7 @@ from cdsm.view.curve import compute_curve
 from cdsm.view.live_view import View
 from cdsm.view.ranges import force_range, tension_range
 from cdsm.view.state import Setting
-from cdsm.view.texts import head_text, matrix_text, tensions_text
+from cdsm.view.texts import about_text, answer_text, head_text, matrix_text, tensions_text
 from tests.view.test_state import (
     DEGREES,
     INFEASIBLE,
@@ -158,6 +158,31 @@ def test_sliders_end_at_the_bounds_of_the_arm(view: View) -> None:
     straight = Setting(q=np.zeros(thin.nv), minimum=0.0, force=np.zeros(3), pull=np.zeros(3))
     sag = 0.05 * thin.length * cdsm.forward_statics(thin, pull=np.zeros(3)).along("z")
     assert sag <= force_range(thin, straight) <= 2.0 * sag
+    # on a link it holds more, and the sliders follow the choice
+    panel = view._panel
+    assert panel._link is not None
+    at_tip = panel.largest_force
+    panel._link.value = "link2"
+    _ = view.shown
+    near = force_range(view.arm, replace(panel._start, link="link2"))
+    assert near > 1.5 * at_tip
+    pose = view.arm.at(panel._start.q)
+    held = [
+        cdsm.payload(pose, u, STABLE, 200.0, link="link2").limits["tension"]
+        for u in ("y", "-y", "z", "-z")
+    ]
+    assert 2.0 * max(held) <= near < 4.0 * max(held)
+    assert {(slider.min, slider.max) for slider in panel._load[1:]} == {(-near, near)}
+    panel._load[1].value = near
+    panel._link.value = "the tip"
+    _ = view.shown
+    assert panel._load[1].max == near  # the force stays
+    panel._load[1].value = 0.0
+    panel._link.value = "link2"
+    _ = view.shown
+    panel._link.value = "the tip"
+    _ = view.shown
+    assert panel._load[3].max == at_tip
     for joint, low, high in zip(view._panel.joints, view.arm.lower, view.arm.upper, strict=True):
         assert np.rad2deg(low) <= joint.min < joint.max <= np.rad2deg(high)
 
@@ -187,6 +212,28 @@ def test_bars_have_the_lengths_and_bounds_of_the_tensions() -> None:
     assert len(marks) == 2 * len(F)  # now both bounds are in the picture
     assert float(marks[1]) / float(marks[0]) == pytest.approx(200.0 / 60.0, rel=1e-3)
     assert tensions_text(pulled(0.004, -0.006, 0.0)).count("slack</span>") == 1
+
+
+def test_bars_say_the_share_of_the_breaking_force() -> None:
+    arm = cdsm.Manipulator.read(Path(__file__).parents[2] / "examples" / "arm.toml", "7x7-0.8mm")
+    shown = show(arm, setting(arm, q=np.full(arm.nv, 0.05)))
+    assert shown.tension is not None
+    page = tensions_text(shown)
+    for value, share in zip(shown.tension.values, shown.tension.breaking_share, strict=True):
+        assert f">{value:.4g} N {100.0 * share:.3g} %" in page
+    largest = shown.tension.values.argmax()
+    said = answer_text(shown, SimpleNamespace(cell=0.01))  # type: ignore[arg-type]
+    name = arm.cables.names[largest]
+    assert f"largest share of a breaking force: {name}" in said
+    assert "%" not in re.sub("<[^>]*>", "", tensions_text(show(soft_arm(), setting(soft_arm()))))
+
+
+def test_long_names_break_at_their_underscores_alone() -> None:
+    path = Path(__file__).parents[2] / "examples" / "finger_with_pulleys.toml"
+    arm = cdsm.Manipulator.read(path)
+    page = tensions_text(show(arm, setting(arm, q=np.deg2rad([5.0, 20.0, 30.0, 15.0]))))
+    assert "flexor_<wbr>of_<wbr>the_<wbr>middle" in page
+    assert "wbr" not in tensions_text(show(soft_arm(), setting(soft_arm())))
 
 
 def test_the_curve_is_the_stiffness_under_each_least_tension(view: View) -> None:
@@ -276,7 +323,7 @@ def test_the_matrix_is_that_of_the_tip(view: View) -> None:
 def test_a_force_on_a_link_acts_there(view: View, sag: bool) -> None:
     panel = view._panel
     assert panel._link is not None
-    assert panel._link.options == ("the tip", "link1", "link2", "link3")
+    assert panel._link.options == ("the tip", "link2", "link3")  # no joint moves link1
     panel._link.value = "link2"
     panel._load[3].value = -0.8
     panel._sag.value = sag
@@ -332,7 +379,7 @@ def test_the_posture_is_saved_as_lines_that_compute_the_same(
         assert list(browser.files) == ["arm_posture.py"]
         K = page.shown.stiffness
         assert K is not None
-        program = text.decode().replace('"ARM.toml"', repr(str(path)))
+        program = text.decode().replace("'ARM.toml'", repr(str(path)))
         names: dict[str, Any] = {}
         exec(program, names)
         assert str(names["K"]) in capsys.readouterr().out
@@ -359,16 +406,67 @@ def test_the_posture_is_saved_as_lines_that_compute_the_same(
                 np.testing.assert_allclose(said["displacements_m"][-1], moved, rtol=1e-6)
 
 
+def test_saved_lines_have_the_file_and_its_changes(tmp_path: Path) -> None:
+    """The command of the view is that of a shell, with --set; the program has them too."""
+    path = tmp_path / "MY ARM.toml"
+    path.write_bytes((Path(__file__).parents[2] / "examples" / "arm.toml").read_bytes())
+    changes = {
+        "minimum": 25.0,
+        "universal": {"link_mass": 0.2, "link_length": [0.05, 0.06, 0.05, 0.04]},
+    }
+    changes |= {"cables.cable1_1.maximum": 300.0, "wire": "7x7-0.8mm"}
+    arm = cdsm.Manipulator.read(path, changes=changes)
+    q = np.deg2rad([4.0, -3.0, 8.0, 2.0, -5.0, 6.0, 1.0, 7.0])
+    with serve(arm, port=0, q=q, minimum=10.0, file=path, changes=changes) as page:
+        browser = Browser()
+        press(page, "save", "Posture", browser)
+        (text,) = browser.files.values()
+        K = page.shown.stiffness
+        assert K is not None
+        shown = html.unescape(page._panel._python.content)
+        assert "put the name" not in text.decode()
+    names: dict[str, Any] = {}
+    exec(text.decode(), names)
+    np.testing.assert_allclose(names["K"].joint, K.joint, rtol=1e-9, atol=1e-9)
+    line = text.decode().splitlines()[1].removeprefix("# ")
+    assert line in shown
+    assert line.count("--set") == 5
+    said = answer(shlex.split(line)[1:])
+    np.testing.assert_allclose(said["along_N_per_m"], [K.along(u) for u in "xyz"], rtol=1e-9)
+
+
+def test_the_command_tells_the_view_its_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    pages = list[View]()
+    monkeypatch.setattr(View, "wait", lambda page: pages.append(page))
+    path = str(Path(__file__).parents[2] / "examples" / "arm.toml")
+    words = ["--set", "minimum=25", "--set", "universal.link_mass=.2", "--set", "wire=7x7-0.8mm"]
+    result = CliRunner().invoke(app, ["view", path, "--port", "0", *words])
+    assert result.exit_code == 0, result.output
+    (page,) = pages
+    again = [path, "--set", "minimum=25", "--set", "universal.link_mass=0.2"]
+    again += ["--set", 'wire="7x7-0.8mm"']
+    assert shlex.split(page._source.arguments) == again
+
+
+def test_the_page_says_which_motors_the_arm_has() -> None:
+    pair = cdsm.Motor("m1", {"cable1_1": 0.012}, stiffness=20.0)
+    assert "m1 (cable1_1 +12 mm): holds its angle by 20 N m/rad" in about_text(
+        soft_arm().with_motors([pair])
+    )
+    assert "motor" not in about_text(soft_arm())
+
+
 def test_a_force_may_start_on_a_link() -> None:
     options: dict[str, Any] = {"port": 0, "minimum": STABLE, "force": (0.0, 0.0, -0.5)}
-    with serve(soft_arm(), link="link1", **options) as page:
-        assert page.shown.setting.link == "link1"
+    with serve(soft_arm(), link="link3", **options) as page:
+        assert page.shown.setting.link == "link3"
         assert page._panel._link is not None
-        assert page._panel._link.value == "link1"
+        assert page._panel._link.value == "link3"
     with serve(soft_arm(), link="tool0", **options) as page:
         assert page.shown.setting.link == ""
-    with pytest.raises(cdsm.CdsmError, match="base_link"):
-        serve(soft_arm(), link="base_link", **options)
+    for name in ("base_link", "link1"):
+        with pytest.raises(cdsm.CdsmError, match=f"link: {name} .*the tip, link2"):
+            serve(soft_arm(), link=name, **options)
 
 
 def test_the_picture_is_an_svg_of_what_the_browser_shows(view: View) -> None:
@@ -384,6 +482,21 @@ def test_the_picture_is_an_svg_of_what_the_browser_shows(view: View) -> None:
     ids, front = cables((0.0, -1.0, 0.0))
     assert {f"cable:{name}:0" for name in view.arm.cables.names} <= ids
     assert "compliance" in ids
+    assert "force" not in ids
+    panel = view._panel
+    for minimum in (STABLE, UNSTABLE, INFEASIBLE):  # without tensions there is an arrow too
+        panel._load[0].max = 1e9  # the slider ends where the arm does
+        panel._load[0].value = minimum
+        panel._link.value = "link2"  # type: ignore[union-attr]
+        panel._load[3].value = -0.8
+        _ = view.shown
+        ids, _ = cables((0.0, -1.0, 0.0))
+        assert "force:link2" in ids
+    panel._link.value = "the tip"  # type: ignore[union-attr]
+    _ = view.shown
+    ids, _ = cables((0.0, -1.0, 0.0))
+    assert "force" in ids
+    panel.reset()
     _, above = cables((0.0, -1.0, 1.0))
     assert front != above
     _, broken = cables((np.nan, 0.0, 0.0))  # whatever a browser says of its camera

@@ -68,7 +68,7 @@ def test_numbers_beyond_all_limits_do_not_end_the_view(view: View) -> None:
         before = slider.value
         slider.value = 1e16  # type: ignore[misc]
         assert view.shown.status is status
-        assert not node(view, "/force").visible
+        assert not node(view, "/forces").visible
         assert not node(view, "/ellipsoid").visible
         slider.value = before  # type: ignore[misc]
         assert view.shown.status is Status.OK

@@ -51,7 +51,7 @@ def sagged(
 
 def text(shown: Shown) -> str:
     scene = Scene.__new__(Scene)
-    scene.cell, scene.force_scale = 0.01, 0.01
+    scene.cell = 0.01
     return head_text(shown) + answer_text(shown, scene)
 
 
