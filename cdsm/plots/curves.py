@@ -388,7 +388,7 @@ def plot_weight_test(test: WeightTest, ax: Axes | None = None, *, title: str | N
     panel.set(xlabel=along, ylabel="weight [N]")
     told = first_slips(test.events)
     events = [
-        _Mark(float(displacement), event.load, event.kind, str(event))
+        _Mark(float(displacement), event.load, event.kind, f"{event.label} {event.where}")
         for event, displacement in zip(test.events, bends, strict=True)
         if event in told
     ]
@@ -473,7 +473,7 @@ def _cycle_events(history: LoadHistory, force: Array, u: Array) -> Iterable[_Mar
     for event, moved in zip(history.events, moves.tolist(), strict=True):
         assert event.step is not None
         before, after = force[event.step : event.step + 2]
-        words = str(event).partition(" at ")[0]
+        words = event.label
         if event.kind == "slip":
             words = begins.pop(float(growing * np.sign(after - before)), "")
         there = float(before + event.share * (after - before))
@@ -485,12 +485,14 @@ def _draw_events(panel: Axes, events: Sequence[_Mark], lowest: bool = False) -> 
     """Mark events on a curve, and write their words in a column at the right, or lowest there."""
     for event in events:
         marker, color = _MARKS[event.kind]
-        look: dict[str, Any] = {"color": color, "mfc": "white", "mew": 1.1, "ms": 5, "zorder": 5}
+        look: dict[str, Any] = {"color": color, "mfc": "white", "mew": 1.1, "ms": 5, "zorder": 7}
         panel.plot(event.x, event.y, marker, ls="", gid=f"event:{event.text}", **look)
     named = sorted(events[:_MOST_EVENTS], key=lambda event: event.y)
     if not named:
         return
     low, high = panel.get_ylim()
+    if lowest:  # the corner of a loop has room for two
+        low -= 0.09 * max(len(named) - 2, 0) * (high - low)
     panel.set_ylim(low, high)
     panel.set_xlim(panel.get_xlim())
     least = 0.08 * (high - low)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
+from cdsm.statics.events import Kind
 from cdsm.support.values import Array
 
 _BESIDE = math.radians(0.1)  # angle to the plane of a groove at which a cable snaps out of it
@@ -27,6 +29,31 @@ def contact_angles(pose: Posture) -> Array:
         return np.zeros(0)
     angle = abs(pose.wrapping.angle)
     return np.asarray(np.where(pose.wrapping.touches, angle, -angle))
+
+
+def contact_kinds(arm: Manipulator) -> tuple[list[Kind], list[str]]:
+    """Return the events of contacts that an arm is watched for (2P,), and their places."""
+    names = contact_names(arm)
+    lifts: list[Kind] = ["lift-off"] * len(names)
+    touches: list[Kind] = ["contact"] * len(names)
+    return lifts + touches, names + names
+
+
+def contact_values(pose: Posture) -> Array:
+    """Return what is negative after each event of :func:`contact_kinds` (2P,) [rad]."""
+    wrap = contact_angles(pose)
+    return np.append(wrap, -wrap)
+
+
+def contact_kind(kinds: Sequence[Kind], i: int, before: Posture) -> Kind:
+    """Return the kind of event i, where the posture ``before`` it is known.
+
+    A cable that lifts off beside the plane of a groove leaves it with a step of its length.
+    """
+    kind = kinds[i]
+    if kind == "lift-off" and is_beside_groove(before, i - kinds.index("lift-off")):
+        return "groove"
+    return kind
 
 
 def is_beside_groove(pose: Posture, pulley: int) -> bool:

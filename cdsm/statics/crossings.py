@@ -7,6 +7,7 @@ anew at each trial.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable
 from functools import partial
 from typing import Generic, NamedTuple, Protocol, TypeVar
@@ -40,8 +41,42 @@ class Watched(NamedTuple, Generic[S]):
     scale: Callable[[S], Array]
 
 
+class Between(Generic[S]):
+    """Equilibria between two ends of a step, each found from those next to it.
+
+    So a search from one side of a jump stays on it, however near the jump is. ``solve`` finds an
+    equilibrium under a share, given the next ones below and above it; None if there is none.
+    """
+
+    def __init__(self, solve: Callable[[float, S, S], S | None], here: S, there: S) -> None:
+        self._solve = solve
+        self._found = [here, there]
+
+    def find(self, share: float) -> S | None:
+        """Return the equilibrium under a share of the step; None if there is none nearby."""
+        k = bisect_left(self._found, share, key=lambda stage: stage.share)
+        if k < len(self._found) and self._found[k].share == share:
+            return self._found[k]
+        stage = self._solve(share, self._found[k - 1], self._found[k])
+        if stage is not None:
+            self._found.insert(k, stage)
+        return stage
+
+    def at(self, share: float) -> S:
+        """Return the equilibrium under a share; where there is none, the next known one above."""
+        stage = self.find(share)
+        if stage is None:
+            stage = next(known for known in self._found if known.share > share)
+        return stage
+
+    def before(self, share: float, value: Callable[[S], float]) -> S:
+        """Return the last equilibrium known up to a share at which ``value`` is not negative."""
+        known = [stage for stage in self._found if stage.share <= share]
+        return next((stage for stage in reversed(known) if value(stage) >= 0.0), known[0])
+
+
 def crossings(
-    at: Callable[[float], S],
+    between: Between[S],
     here: S,
     there: S,
     watch: Watched[S],
@@ -61,7 +96,7 @@ def crossings(
 
     def value(share: float, i: int) -> float:
         if share not in known:
-            known[share] = watch.value(at(share))
+            known[share] = watch.value(between.at(share))
         return float(known[share][i])
 
     for i in np.flatnonzero((before >= -none) & (after < -none)).tolist():

@@ -26,6 +26,11 @@ _WORDS: Final[dict[Kind, str]] = {
     "contact": "{} touches",
     "buckling": "the arm buckles, {} most",
 }
+_AT_PULLEYS: Final[dict[Kind, str]] = {
+    "lift-off": "lifts off",
+    "groove": "leaves its groove",
+    "contact": "touches",
+}
 _SHOWN = 8  # most events in a text
 
 
@@ -56,10 +61,22 @@ class Event:
     step: int | None = None
 
     def __str__(self) -> str:
+        return f"{_WORDS[self.kind].format(self.place)} {self.where}"
+
+    @property
+    def where(self) -> str:
+        """The load in words, such as ``at 4.5 N``; in a load cycle with the step."""
         where = f"at {self.load:.4g} N" if self.load else f"at {100.0 * self.share:.4g} % of it"
         where = where if self.share else "at once"
-        where += "" if self.step is None else f" in the step to load {self.step}"
-        return f"{_WORDS[self.kind].format(self.place)} {where}"
+        return where + ("" if self.step is None else f" in the step to load {self.step}")
+
+    @property
+    def label(self) -> str:
+        """What happens, without the load, in the few words that a picture has room for."""
+        if self.kind in _AT_PULLEYS:
+            cable, _, pulley = self.place.partition(" on the ")
+            return f"{cable} {_AT_PULLEYS[self.kind]} ({pulley.partition(' (')[0]})"
+        return _WORDS[self.kind].format(self.place)
 
     def to_dict(self) -> dict[str, object]:
         """Return it for JSON: the load in N."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, final
@@ -109,8 +109,9 @@ class LoadHistory(Result, Plotted):
         """What happens on the way, in its order; located when first asked for.
 
         Holes in which a cable begins to slide, cables that go slack, pass their maximum or leave
-        their law in any segment, joints that reach their stops, losses of stability. They are
-        roots within the sub-steps; what begins and ends within one sub-step is not seen.
+        their law in any segment, that lift off pulleys, leave their grooves or touch them, joints
+        that reach their stops, losses of stability. They are roots within the sub-steps; what
+        begins and ends within one sub-step is not seen.
         """
         return self._located[0]
 
@@ -128,6 +129,14 @@ class LoadHistory(Result, Plotted):
         start = self.reference
         before = start.tip[:3, 3] if point is None else point.position(start)
         return frozen(np.array(places).reshape(-1, 3) - before)
+
+    @property
+    def _events_by_step(self) -> list[list[Event]]:
+        steps = [list[Event]() for _ in self.load]
+        for event in self.events:
+            assert event.step is not None
+            steps[event.step].append(event)
+        return steps
 
     @property
     def arm(self) -> Manipulator:
@@ -213,9 +222,10 @@ class LoadHistory(Result, Plotted):
         return assemble_segments(self.pose(k), T, sliding, self.applied[k], friction)
 
     def write_loop(self, path: str | os.PathLike[str]) -> Path:
-        """Write force, displacement, number of sliding holes and lost work as CSV; return the path.
+        """Write force, displacement, sliding holes, lost work and events as CSV; return the path.
 
         Forces and displacements are those at the tip; more columns have those of loads on links.
+        Events stand in the row of the load that ends their step, with their own loads.
         One row per load; :meth:`write` writes all states. Raises CdsmError without pandas, and
         FileError if the file cannot be written.
         """
@@ -232,6 +242,10 @@ class LoadHistory(Result, Plotted):
                 columns[f"displacement {axis} {where} [m]"] = hung.displacement[:, i]
         columns["sliding holes"] = np.count_nonzero(self.sliding, axis=1)
         columns["dissipated [J]"] = self.dissipated
+        columns["events"] = [
+            "; ".join(f"{event.label} {replace(event, step=None).where}" for event in happening)
+            for happening in self._events_by_step
+        ]
         return write_file(path, data_frame(columns, "load", self.load).to_csv)
 
     def __str__(self) -> str:

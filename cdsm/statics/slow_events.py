@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.statics.crossings import ROUNDING, Watched, crossings
+from cdsm.statics.contact_events import contact_angles, contact_kind
+from cdsm.statics.crossings import ROUNDING, Between, Watched, crossings
 from cdsm.statics.events import Event, Kind, buckling_joint
 from cdsm.statics.hung_loads import total_force
 from cdsm.statics.pieces import root
@@ -69,29 +70,28 @@ class _Walk:
         self._arm = arm
         self._watch = watch
         self._state = start
-        self._share = 0.0  # of the step to a load
         self.events = list[Event]()
         self.angles = list[Array]()
         f = arm.balance(start, start.load)
-        here = SlowStage(0.0, known_point(f, start.arm_state, start.x), f)
-        self._values = watch.value(here)
-        self._none = ROUNDING * watch.scale(here)
+        self._here = SlowStage(0.0, known_point(f, start.arm_state, start.x), f)
+        self._values = watch.value(self._here)
+        self._none = ROUNDING * watch.scale(self._here)
         self._passed = self._values < -self._none  # which quantities are negative
         self._slips = np.array([kind == "slip" for kind in watch.kinds], dtype=np.bool_)
 
     def to_load(self, step: int, load: Action, substeps: int, near: EquilibriumPath) -> None:
         """Go to a load in sub-steps, and note the events."""
         begin = self._state.load
-        self._share = 0.0
+        self._here = self._here._replace(share=0.0)
         part = 1.0 / substeps
         least = _LEAST * part
-        while self._share < 1.0:
-            before = self._share
+        while self._here.share < 1.0:
+            before = self._here.share
             goal = before + part if before + 1.5 * part < 1.0 else 1.0
             if not self._go(step, begin, load, goal, least, near):
                 part = max(part / 2.0, least)
-            elif self._share < goal:  # the next event is likely to be as near as this one
-                part = max(_NEXT * (self._share - before), least)
+            elif self._here.share < goal:  # the next event is likely to be as near as this one
+                part = max(_NEXT * (self._here.share - before), least)
             else:
                 part = min(2.0 * part, 1.0 / substeps)
 
@@ -112,55 +112,51 @@ class _Walk:
         def action(share: float) -> Action:
             return begin.interpolate(load, share)
 
-        def found(share: float) -> SlowStage | None:
+        def near_points(share: float, guesses: list[Array]) -> SlowStage | None:
             f = self._arm.balance(self._state, action(share))
-            guesses = [near[share]] if share in near else []
-            if far:  # on the straight way there
-                part = (share - self._share) / (goal - self._share)
-                guesses = [self._state.x + part * (far[0] - self._state.x)]
             point = continued(f, [*guesses, self._state.x], self._state.arm_state.pose.q)
             return None if point is None else SlowStage(share, point, f)
 
-        far = list[Array]()
-        there = found(goal)
-        far += [there.point.x] if there else []
-        close = goal - self._share <= 1.5 * least
+        def solve(share: float, below: SlowStage, above: SlowStage) -> SlowStage | None:
+            return near_points(share, _guesses(share, below, above))
+
+        there = near_points(goal, [near[goal]] if goal in near else [])
+        close = goal - self._here.share <= 1.5 * least
         if there is None and not close:
             return False
         if there is None:
             self._jump(step, action, goal)
             return True
+        between = Between(solve, self._here, there)
         if close:
-            roots = self._roots(found, there)
+            roots = self._roots(between, there)
         else:
-            passed, stage = self._first(found, there)
-            if passed and stage.share - self._share < least:
+            passed, stage = self._first(between, there)
+            if passed and stage.share - self._here.share < least:
                 return False
             roots = [(i, stage) for i in passed]
             there = stage
         self._stand(there, action(there.share))
         for i, stage in roots:
             self._passed[i] = True
-            kind = self._watch.kinds[i]
+            kind = _kind(self._watch, i, between, stage.share)
             force = float(np.linalg.norm(total_force(action(stage.share).wrench)))
             self.events.append(Event(kind, self._watch.places[i], stage.share, force, step))
             self.angles.append(stage.point.state.pose.q)
         return True
 
-    def _roots(
-        self, found: Callable[[float], SlowStage | None], there: SlowStage
-    ) -> list[tuple[int, SlowStage]]:
+    def _roots(self, between: Between[SlowStage], there: SlowStage) -> list[tuple[int, SlowStage]]:
         """Return all quantities that pass before ``there``, and where, in their order."""
         after = self._watch.value(there)
         roots = list[tuple[int, SlowStage]]()
         for i in np.flatnonzero(~self._passed & (after < -self._none)).tolist():
-            stage = found(self._root(found, there, i, {there.share: after}))
-            roots.append((i, stage or there))
+            share = self._root(between, there, i, {there.share: after})
+            roots.append((i, between.find(share) or there))
         return sorted(roots, key=lambda root: root[1].share)
 
     def _root(
         self,
-        found: Callable[[float], SlowStage | None],
+        between: Between[SlowStage],
         there: SlowStage,
         i: int,
         known: dict[float, Array],
@@ -168,25 +164,23 @@ class _Walk:
     ) -> float:
         """Return the share at which a quantity is 0 before ``there``, or ``end``."""
         if self._values[i] <= self._none[i]:
-            return self._share
+            return self._here.share
 
         def value(share: float) -> float:
-            if share == self._share:
+            if share == self._here.share:
                 return float(self._values[i])
             if share not in known:
-                known[share] = self._watch.value(found(share) or there)
+                known[share] = self._watch.value(between.at(share))
             at = float(known[share][i])
             return at if abs(at) > _ZERO * self._none[i] else 0.0
 
         end = there.share if end is None else end
         if value(end) >= 0.0:
             return end
-        precision = _PRECISION * (there.share - self._share)
-        return root(value, self._share, end, precision)
+        precision = _PRECISION * (there.share - self._here.share)
+        return root(value, self._here.share, end, precision)
 
-    def _first(
-        self, found: Callable[[float], SlowStage | None], there: SlowStage
-    ) -> tuple[list[int], SlowStage]:
+    def _first(self, between: Between[SlowStage], there: SlowStage) -> tuple[list[int], SlowStage]:
         """Return the quantities that pass first before ``there``, and where; else ``there``."""
         before = self._values
         after = self._watch.value(there)
@@ -197,11 +191,11 @@ class _Walk:
         share = there.share
         parts = before[passes] / (before[passes] - after[passes])
         for i in passes[parts.argsort()].tolist():
-            root = self._root(found, there, i, known, share)
+            root = self._root(between, there, i, known, share)
             if root < share:
                 first = i
             share = root
-        stage = found(share) or there
+        stage = between.find(share) or there
         now = self._watch.value(stage) <= self._none
         now[first] = True
         now &= ~self._passed & ((after < -self._none) | self._slips)  # some slide for a moment only
@@ -212,7 +206,7 @@ class _Walk:
         state = stage.point.state
         assert isinstance(state, ChainArmState)
         self._state = QuasiStaticState(load, state, stage.point.x, stage.point.stop_torque)
-        self._share = stage.share
+        self._here = stage
         self._values = self._watch.value(stage)
         self._none = ROUNDING * self._watch.scale(stage)
         self._passed &= self._values <= self._none
@@ -221,7 +215,7 @@ class _Walk:
     def _jump(self, step: int, action: Callable[[float], Action], goal: float) -> None:
         """Go to ``goal`` where no equilibrium is near, in ever smaller steps, or by a jump."""
         parts = list[Substep]()
-        begin = self._share
+        begin = self._here.share
         what = f"the step to load {step}"
         self._arm.step_to(self._state, action(goal), 1, what, seen=parts.append)
         for part in parts:
@@ -249,14 +243,11 @@ def _within(
 ) -> list[tuple[Kind, str, SlowStage]]:
     """Return the events of a sub-step in their order."""
 
-    def found(share: float) -> SlowStage | None:
+    def solve(share: float, below: SlowStage, above: SlowStage) -> SlowStage | None:
         f = arm.balance(part.before, part.before.load.interpolate(part.after.load, share))
-        between = part.before.x + share * (part.after.x - part.before.x)
-        point = continued(f, (between, part.before.x), part.before.arm_state.pose.q)
+        guesses = [*_guesses(share, below, above), part.before.x]
+        point = continued(f, guesses, part.before.arm_state.pose.q)
         return None if point is None else SlowStage(share, point, f)
-
-    def at(share: float) -> SlowStage:
-        return found(share) or last
 
     f = arm.balance(part.before, part.before.load)
     here = SlowStage(0.0, known_point(f, part.before.arm_state, part.before.x), f)
@@ -268,10 +259,13 @@ def _within(
         low, high = 0.0, 1.0
         for _ in range(_HALVINGS):
             middle = (low + high) / 2.0
-            stage = found(middle)
+            stage = solve(middle, last, there)
             low, high, last = (low, middle, last) if stage is None else (middle, high, stage)
-    roots = sorted(crossings(at, here, last, watch, _PRECISION), key=lambda root: root[1])
-    events = [(watch.kinds[i], watch.places[i], at(share)) for i, share in roots]
+    between = Between(solve, here, last)
+    roots = sorted(crossings(between, here, last, watch, _PRECISION), key=lambda root: root[1])
+    events = [
+        (_kind(watch, i, between, share), watch.places[i], between.at(share)) for i, share in roots
+    ]
     if part.snapped:
         K = last.point.state.stiffness
         joint = buckling_joint(K, last.point.out, arm.reference.arm.joint_names)
@@ -283,3 +277,21 @@ def _within(
             if watch.kinds[i] in _SINCE
         ]
     return events
+
+
+def _guesses(share: float, below: SlowStage, above: SlowStage) -> list[Array]:
+    """Return where the search for an equilibrium begins, between two that are known.
+
+    A step of a cable's length at a pulley lies between them: begin on the near side of it.
+    """
+    part = (share - below.share) / (above.share - below.share)
+    straight = below.point.x + part * (above.point.x - below.point.x)
+    before, after = (contact_angles(stage.point.state.pose) > 0.0 for stage in (below, above))
+    guesses = [straight, below.point.x]
+    return guesses if np.array_equal(before, after) else guesses[::-1]
+
+
+def _kind(watch: Watched[SlowStage], i: int, between: Between[SlowStage], share: float) -> Kind:
+    """Return the kind of event i, at a share."""
+    before = between.before(share, lambda stage: float(watch.value(stage)[i]))
+    return contact_kind(watch.kinds, i, before.point.state.pose)

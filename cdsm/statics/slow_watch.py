@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.friction.capstan import can_stick
+from cdsm.statics.contact_events import contact_kinds, contact_values
 from cdsm.statics.crossings import Watched
 from cdsm.statics.events import Kind
 from cdsm.statics.quasi_static import ChainArmState, QuasiStaticArm
@@ -67,6 +68,9 @@ def watched_slowly(arm: QuasiStaticArm, holes: Sequence[str]) -> Watched[SlowSta
     places = [*holes, *holes]
     places += [names[c] for _, indices in of_cables for c in indices]
     places += [robot.joint_names[i % robot.nv] for i in stops]
+    of_contacts, contacts = contact_kinds(robot)
+    kinds += of_contacts
+    places += contacts
 
     def value(stage: SlowStage) -> Array:
         state = stage.point.state
@@ -82,13 +86,14 @@ def watched_slowly(arm: QuasiStaticArm, holes: Sequence[str]) -> Watched[SlowSta
                 (least - low)[begun],
                 (high - largest)[ended],
                 stage.balance.gaps(stage.point.x).ravel()[stops],
+                contact_values(state.pose),
             ]
         )
 
     def scale(stage: SlowStage) -> Array:
         size = max(float(stage.point.state.tension.max(initial=0.0)), SMALLEST)
         tensions = sum(indices.size for _, indices in of_cables)
-        parts = (1.0, 2 * len(holes)), (size, tensions), (1.0, stops.size)
+        parts = (1.0, 2 * len(holes)), (size, tensions), (1.0, stops.size + len(contacts))
         return np.concatenate([np.full(count, unit) for unit, count in parts])
 
     return Watched(tuple(kinds), tuple(places), value, scale)

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from cdsm.applied import Applied, combined, scaled
 from cdsm.manipulator import Manipulator
-from cdsm.statics.contact_events import contact_angles, contact_names, is_beside_groove
+from cdsm.statics.contact_events import contact_kind, contact_kinds, contact_values
 from cdsm.statics.continuation import follow
-from cdsm.statics.crossings import Watched, crossings
+from cdsm.statics.crossings import Between, Watched, crossings
 from cdsm.statics.events import Event, Kind, buckling_joint
 from cdsm.statics.hung_loads import total_force
 from cdsm.statics.locked_arm import LockedArm
@@ -26,7 +26,6 @@ from cdsm.statics.pieces import Model, Stage, dip, equilibrium_near, slope, stag
 from cdsm.support.values import Array
 
 _ALONG = 1e-9  # 1 − cosine of the largest angle between a weight and gravity
-_JUST = 1e-6  # part of a step before an event, where a contact that ends is looked at
 _DEPTH = 4  # most halvings of a step in which a quantity may dip below zero
 
 
@@ -57,23 +56,20 @@ def watched(arm: LockedArm, maximum: Array | None = None) -> Watched[Stage]:
     stops = np.flatnonzero(np.isfinite([arm.reference.arm.lower, arm.reference.arm.upper]))
     kinds += ["stop"] * stops.size
     places += [joints[i % len(joints)] for i in stops]
-    contacts = contact_names(arm.reference.arm)
-    P = len(contacts)
-    kinds += ["lift-off"] * P
-    kinds += ["contact"] * P
-    places += contacts + contacts
+    of_contacts, contacts = contact_kinds(arm.reference.arm)
+    kinds += of_contacts
+    places += contacts
 
     def value(stage: Stage) -> Array:
         locked = stage.arm
         F = locked.continued_tensions(stage.pose)
         gaps = stage.balance.gaps(stage.point.x).ravel()[stops]
-        wrap = contact_angles(stage.pose)
-        parts = (most - F)[limited], (F - low)[begun], (high - F)[ended], gaps, wrap, -wrap
-        return np.concatenate(parts)
+        tensions = (most - F)[limited], (F - low)[begun], (high - F)[ended]
+        return np.concatenate([*tensions, gaps, contact_values(stage.pose)])
 
     def scale(stage: Stage) -> Array:
         size = max(float(abs(stage.point.state.tension).max(initial=0.0)), 1e-300)
-        angles = stops.size + 2 * P
+        angles = stops.size + len(contacts)
         return np.append(np.full(len(kinds) - angles, size), np.ones(angles))
 
     return Watched(tuple(kinds), tuple(places), value, scale)
@@ -157,9 +153,8 @@ def _within(
 ) -> list[Event]:
     """Return the events between two equilibria of a branch."""
 
-    def at(share: float) -> Stage:
-        stage = equilibrium_near(model, share, here) or equilibrium_near(model, share, there)
-        return stage or there
+    def solve(share: float, below: Stage, above: Stage) -> Stage | None:
+        return equilibrium_near(model, share, below) or equilibrium_near(model, share, above)
 
     dip = _dip(model, here, there, watch) if depth else None
     if dip is not None:
@@ -169,13 +164,11 @@ def _within(
                 *_within(model, here, middle, watch, force, depth - 1),
                 *_within(model, middle, there, watch, force, depth - 1),
             ]
+    between = Between(solve, here, there)
     events = list[Event]()
-    for i, share in crossings(at, here, there, watch):
-        kind = watch.kinds[i]
-        if kind == "lift-off":
-            pulley = i - watch.kinds.index("lift-off")
-            before = max(here.share, share - _JUST * (there.share - here.share))
-            kind = "groove" if is_beside_groove(at(before).pose, pulley) else kind
+    for i, share in crossings(between, here, there, watch):
+        before = between.before(share, lambda stage, i=i: float(watch.value(stage)[i]))  # type: ignore[misc]
+        kind = contact_kind(watch.kinds, i, before.pose)
         events.append(Event(kind, watch.places[i], share, share * force))
     return events
 
