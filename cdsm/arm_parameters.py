@@ -27,7 +27,7 @@ class ArmParameters:
       law as a whole, and ``exponent`` [-] of a law :meth:`SpringLaw.power`.
     - ``bending_stiffness`` EI [N m²] of a neck, a gap of a backbone or a link that bends; its GJ
       changes in the same ratio.
-    - ``motor_stiffness`` k_m [N m/rad] of a motor that has one.
+    - ``motor_stiffness`` `k_m` [N m/rad] of a motor that has one.
     - Of a cable: ``lead`` [m], ``hole_angle`` [rad], ``friction`` μ [-] in its holes, ``spring``
       [N/m] in series, ``rigidity`` [-], a factor on the EA of its law, ``slack`` [m] and ``gain``
       [-] of its motor, ``phase`` [rad], which is added to its hole angle, and ``pulley_radius``

@@ -34,14 +34,14 @@ class Assembly(Result):
     """Wires of an arm with its motors at 0; made by :meth:`Manipulator.assemble`.
 
     Motors that are fewer than cables cannot set each tension: B of ``arm.motors`` has C − M
-    directions N with Nᵀ B = 0, and Nᵀ l_0 stays what it is now. A motor turned by φ leaves the
-    wires l_0 − B φ. A compliant one has the torque Bᵀ F of these tensions at φ, and yields as it
-    changes; one that holds its torque takes a torque for its command.
+    directions N with `Nᵀ B = 0`, and `Nᵀ l_0` stays what it is now. A motor turned by φ leaves the
+    wires `l_0 − B φ`. A compliant one has the torque `Bᵀ F` of these tensions at φ, and yields as
+    it changes; one that holds its torque takes a torque for its command.
 
     Attributes:
         posture: The posture of the assembly.
         tension: F (C,) [N] there.
-        free_lengths: Original lengths l_0 (C,) [m] of the wires; L of force-controlled cables.
+        free_lengths: Original lengths `l_0` (C,) [m] of the wires; L of force-controlled cables.
     """
 
     _headline = "free_lengths"
@@ -58,7 +58,7 @@ class Assembly(Result):
         return frozen(np.where(motors.holds_torque, motors.matrix.T @ self.tension, 0.0))
 
     def missing_wire(self, pose: Any) -> Array:
-        """Compute N Nᵀ ΔL (C,) [m] from the assembly to a posture: wire that no motor can give.
+        """Compute `N Nᵀ ΔL` (C,) [m] from the assembly to a posture: wire that no motor can give.
 
         The cables stretch by it, and go slack where it is negative, whatever the motors do.
         """
@@ -127,9 +127,10 @@ class Assembly(Result):
         return LockedWires.of(laws, driven.tension, rest, rest, soft, driven.torque)
 
     def slopes(self, driven: Driven, lengths: Array) -> tuple[Array, Array]:
-        """Compute F (C,) [N] at lengths L (C,), and ∂F/∂command (C, M), of wires that could push.
+        """Compute F (C,) [N] at lengths L (C,), and `∂F/∂command` (C, M), of wires that could push.
 
-        Rest lengths l_0 change F by −k (1 + ε); motors that yield pass on P = K_eff K_L⁻¹ of it.
+        Rest lengths `l_0` change F by `−k (1 + ε)`; motors that yield pass on
+        `P = K_eff K_L⁻¹` of it.
         """
         arm = self.posture.arm
         laws = arm.laws

@@ -39,9 +39,9 @@ class Cable:
     """A cable through an ordered list of sites and pulleys, actuator side first.
 
     Its length L is ``lead`` plus the straight segments between sites; the lead must be long enough
-    for the series spring. The original length of the wire is l_0 = (L − ΔF/k_series)/(1 + ε(F)),
-    with ΔF = F − F_0 and the strain ε zero at F_0, :attr:`Elasticity.rest`. The cable stiffness is
-    k = 1/(l_0/EA(F) + 1/k_series), and 0 if the motor controls force.
+    for the series spring. The original length of the wire is `l_0 = (L − ΔF/k_series)/(1 + ε(F))`,
+    with `ΔF = F − F_0` and the strain ε zero at `F_0`, :attr:`Elasticity.rest`. The cable stiffness
+    is `k = 1/(l_0/EA(F) + 1/k_series)`, and 0 if the motor controls force.
 
     The cable ends at its last site and passes all others, which are holes. The lead is parallel to
     x of the first site's link. Without a lead, the first site is the actuator, not a hole. Between
@@ -53,7 +53,7 @@ class Cable:
             sheaths between them (:class:`Site`, :class:`Pulley`, :class:`Sheath`).
         elasticity: Law EA(F).
         lead: Straight cable between the actuator and the first site [m].
-        series_stiffness: k_series of a spring (Fig. 11) or drive in series [N/m]; inf: none.
+        series_stiffness: `k_series` of a spring (Fig. 11) or drive in series [N/m]; inf: none.
         control: What the motor keeps constant, ``"position"``: length; ``"force"``: tension.
         minimum: Smallest allowed tension [N]; every tension distribution respects both bounds.
         maximum: Largest allowed tension [N]; inf: no limit.
@@ -62,8 +62,8 @@ class Cable:
             Slack and gain count where a pull is given (:func:`~cdsm.forward_statics`).
 
     Raises InvalidInput, which names the cable and the fault. Its methods take F [N], any shape, and
-    l_0 [m], ``free_length``: InvalidInput if it is not positive, ElasticityRangeError if a tension
-    is outside the law, or no tension gives an elongation.
+    `l_0` [m], ``free_length``: InvalidInput if it is not positive, ElasticityRangeError if a
+    tension is outside the law, or no tension gives an elongation.
 
     Example:
         >>> import cdsm
@@ -167,18 +167,18 @@ class Cable:
         return replace(self, sites=(*sites[: holes.start], *rough, *sites[holes.stop :]))
 
     def elongation(self, tension: ArrayLike, free_length: float) -> Array:
-        """Compute the elongation Δl = l_0 ε(F) + (F − F_0)/k_series [m], zero at F_0 = ``rest``."""
+        """Compute the elongation `l_0 ε(F) + (F − F_0)/k_series` [m]; `F_0` is ``rest``."""
         wire = _length(free_length) * self.elasticity.strain(tension)
         spring = (np.asarray(tension) - self.elasticity.rest) / self.series_stiffness
         return np.asarray(wire + spring)
 
     def tangent_stiffness(self, tension: ArrayLike, free_length: float) -> Array:
-        """Compute dF/dΔl = 1/(l_0/EA(F) + 1/k_series) [N/m], whatever ``control`` is."""
+        """Compute `dF/dΔl = 1/(l_0/EA(F) + 1/k_series)` [N/m], whatever ``control`` is."""
         wire = _length(free_length) / self.elasticity.rigidity(tension)
         return np.asarray(1.0 / (wire + 1.0 / self.series_stiffness))
 
     def energy(self, tension: ArrayLike, free_length: float) -> Array:
-        """Compute the energy l_0 ∫ F dε + (F² − F_0²)/(2 k_series) [J], zero at F_0 = ``rest``."""
+        """Compute the energy `l_0 ∫ F dε + (F² − F_0²)/(2 k_series)` [J]; `F_0` is ``rest``."""
         wire = _length(free_length) * self.elasticity.energy(tension)
         squares = np.asarray(tension) ** 2 - self.elasticity.rest**2
         return np.asarray(wire + squares / (2.0 * self.series_stiffness))
@@ -240,14 +240,14 @@ def serpentine_cables(
     """Return the cables of a serpentine arm, routed through the holes of its disks.
 
     A cable of joint k passes all disks before it, and ends on the first disk after it. Its hole in
-    a disk is at (x, R cos φ, R sin φ) in the frame of the link: x is the position of the disk, φ
+    a disk is at `(x, R cos φ, R sin φ)` in the frame of the link: x is the position of the disk, φ
     the angle of the :class:`~cdsm.CableRoute`, R the radius of the route, or the hole radius of the
     disk. The i-th cable of joint k has the name ``cable{k}_{i}``.
 
     Args:
         geometry: The arm.
         elasticity: One law for all cables, or one law per cable in the geometry's order.
-        series_stiffness: k_series of all cables [N/m], as in :class:`Cable`.
+        series_stiffness: `k_series` of all cables [N/m], as in :class:`Cable`.
         control: Motor control of all cables, as in :class:`Cable`.
 
     Raises:

@@ -81,7 +81,7 @@ class Pulley:
         groove: Whether the pulley keeps the cable in its plane.
         turns: Whole turns of the cable beyond Φ in (−90°, 270°].
         friction: Coulomb friction coefficient μ [-] of a post that does not turn, 0 to 2.
-        bearing: Friction of a pulley that turns, μ_bearing r_bearing/r [-], 0 to 1; not both.
+        bearing: Friction of a pulley that turns, `μ_bearing r_bearing/r` [-], 0 to 1; not both.
 
     Raises InvalidInput if an attribute is anything else.
 
@@ -152,7 +152,7 @@ class JointPulley:
         groove: As of a :class:`Pulley`, like the following.
         turns: Whole turns beyond Φ in (−90°, 270°].
         friction: μ [-] of a post that does not turn.
-        bearing: Friction of a pulley that turns, μ_bearing r_bearing/r [-].
+        bearing: Friction of a pulley that turns, `μ_bearing r_bearing/r` [-].
 
     Raises InvalidInput if an attribute is anything else.
 
@@ -200,7 +200,7 @@ class Sheath:
     """A sheath (Bowden tube) that guides a cable, before its first site or between two sites.
 
     Its length is constant, so it exerts no torque on the joints that it passes, and counts for the
-    stiffness of the cable alone. With friction, the tension falls by e^{−μφ} along it, over the
+    stiffness of the cable alone. With friction, the tension falls by `e^{−μφ}` along it, over the
     total angle φ by which it is bent. The compliance of the sheath itself is in series: add it to
     1/``series_stiffness``. Its bending stiffness is a spring at the joints that it passes.
 

@@ -153,7 +153,7 @@ class ElasticityRangeError(CdsmError, ValueError):
 class InfeasibleTension(CdsmError):
     """No cable tension within the bounds balances the arm at this posture.
 
-    ``missing`` (nv,) [N m] or [N] is what the tensions within the bounds that minimise Σ|missing|
+    ``missing`` (nv,) [N m] or [N] is what the tensions within the bounds that minimise `Σ|missing|`
     leave, and ``joint`` the name of the joint with most of it. Of the cables without a fixed
     tension, ``binding`` names those at a bound then, and ``relaxation`` [N] is the least widening
     of all bounds that helps, or inf. ``fixed`` names the cables if their fixed tensions prevent it.

@@ -35,7 +35,7 @@ class Springs:
     Attributes:
         joints: Names of the joints in Pinocchio's order, those that follow others included.
         stiffness: k (n,) [N m/rad] at rest, [N/m] for prismatic joints; 0: none.
-        angle: q_0 (n,) without torque [rad], [m] for prismatic joints.
+        angle: `q_0` (n,) without torque [rad], [m] for prismatic joints.
         laws: Laws of springs that are not linear, by the number of their joint.
         given: Stiffness and angle, or law, of each spring by the name of its joint.
         units: Unit of the coordinate of each joint (n,): rad, or m for prismatic joints.
@@ -90,7 +90,7 @@ class Springs:
         return stiffness
 
     def torque(self, q: Array) -> Array:
-        """Compute the derivative of the energy Σ E(θ − q_0) by q (nv,): k (θ − q_0), or M."""
+        """Compute the derivative of the energy `Σ E(θ − q_0)` by q (nv,): `k (θ − q_0)`, or M."""
         angles = self._angles(q)
         pulled = self.constant * (angles - self.angle)
         if self.laws:
@@ -98,7 +98,7 @@ class Springs:
         return pulled if self._coupling is None else np.asarray(pulled @ self._coupling.matrix)
 
     def energy(self, q: Array) -> float:
-        """Compute Σ E(θ − q_0) [J]: ½ k (θ − q_0)² of a linear spring."""
+        """Compute `Σ E(θ − q_0)` [J]: `½ k (θ − q_0)²` of a linear spring."""
         angles = self._angles(q)
         energy = float(0.5 * self.constant @ (angles - self.angle) ** 2)
         for law, of, free in self._alike:
@@ -106,7 +106,7 @@ class Springs:
         return energy
 
     def stiffness_at(self, q: Array) -> Array:
-        """Compute the second derivative of the energy (nv, nv) [N m/rad]: diag k, or Sᵀ diag k S.
+        """Compute the second derivative of the energy (nv, nv) [N m/rad]: diag k, or `Sᵀ diag k S`.
 
         Of springs with laws, k is the tangent M′ at q (nv,).
         """

@@ -40,7 +40,7 @@ class Coupling(NamedTuple):
         return np.asarray(q @ self.matrix.T + self.offset)
 
     def square(self, matrix: Array) -> Array:
-        """Compute Sᵀ K S (…, nv, nv)."""
+        """Compute `Sᵀ K S` (…, nv, nv)."""
         return np.asarray(self.matrix.T @ matrix @ self.matrix)
 
 

@@ -121,7 +121,7 @@ class KinematicSolution(Result):
 def inverse_kinematics(
     arm: Manipulator, target: ArrayLike, guess: ArrayLike | None = None, *, tolerance: float = 1e-8
 ) -> KinematicSolution:
-    """Find joint angles for a tip target: min ½‖θ − guess‖² with tip(θ) = target (Eq. 7).
+    """Find joint angles for a tip target: `min ½‖θ − guess‖²` with `tip(θ) = target` (Eq. 7).
 
     Of many solutions, the one nearest to the guess is returned, at least locally. If there is none,
     ``reachable`` is false, and the misfit is the least of searches from a dozen other postures too.
@@ -130,7 +130,8 @@ def inverse_kinematics(
         arm: The arm.
         target: Position (3,) [m] of ``tool0``, or pose (4, 4) like ``pose.tip`` [m], base axes.
         guess: Joint angles (nv,) [rad], within the limits, that the solution is near; default 0.
-        tolerance: Largest √(position error²/arm length² + orientation error²) of a reached target.
+        tolerance: Largest `√(e²/L² + φ²)` of a reached target, with its error of position
+            e, that of orientation φ, and the length L of the arm.
 
     Raises:
         InvalidInput: The target is no position or rigid transform, the guess is not (nv,) numbers
@@ -170,13 +171,14 @@ def solve_joint_angles(
     *,
     tolerance: float = 1e-8,
 ) -> KinematicSolution:
-    """Find joint angles from cable lengths: min ‖L(θ) − L‖² within the joint limits (Eq. 5).
+    """Find joint angles from cable lengths: `min ‖L(θ) − L‖²` within the joint limits (Eq. 5).
 
     Args:
         arm: The arm.
         cable_lengths: L (C,) [m], lead included, in the order of ``arm.cables``.
         guess: As for :func:`inverse_kinematics`, with the same choice among many solutions.
-        tolerance: Largest ‖L(θ) − L‖/arm length of reached lengths; for measured ones, their error.
+        tolerance: Largest `‖L(θ) − L‖` of reached lengths, over the length of the arm; for
+            measured ones, their error.
 
     Raises:
         InvalidInput: The lengths are not (C,) positive numbers; guess and tolerance as there. Two

@@ -68,8 +68,8 @@ class Manipulator(ComputedArm):
 
     Attributes:
         springs: Springs at the joints: ``springs.stiffness`` k (n,) [N m/rad] and
-            ``springs.angle`` q_0 (n,) [rad], at which they have no torque; of all n joints, also
-            those that follow others. Of a spring with a law, k is the tangent at q_0.
+            ``springs.angle`` `q_0` (n,) [rad], at which they have no torque; of all n joints, also
+            those that follow others. Of a spring with a law, k is the tangent at `q_0`.
         motors: All motors: ``motors.matrix`` is B (C, M) [m/rad], ``motors.names`` are their names.
 
     Raises:
@@ -225,7 +225,7 @@ class Manipulator(ComputedArm):
     def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:
         """Evaluate the arm at joint angles q: kinematics, cable lengths and gravity.
 
-        Pinocchio gives tip, J_X and gravity; L and J_L follow from its twists and placements.
+        Pinocchio gives tip, `J_X` and gravity; L and `J_L` follow from its twists and placements.
 
         Args:
             q: Joint angles (nv,) [rad], in the order of :attr:`joint_names`.
@@ -307,7 +307,7 @@ class Manipulator(ComputedArm):
 
         Args:
             springs: By the name of the joint: stiffness k [N m/rad], or [N/m] if it is prismatic;
-                or (k, q_0) with the angle [rad] or way [m] without torque, which is 0 otherwise;
+                or (k, `q_0`) with the angle [rad] or way [m] without torque, which is 0 otherwise;
                 or a :class:`~cdsm.SpringLaw`.
 
         Raises:
@@ -321,9 +321,10 @@ class Manipulator(ComputedArm):
 
         Args:
             terms: Objects with a ``name``, and methods ``energy(pose)`` U [J], ``torque(pose)``
-                ∂U/∂θ (nv,) and ``stiffness(pose)`` ∂²U/∂θ² (nv, nv), as in ``cdsm/terms.py``. They
-                count in balance and K_θ. What cannot take them refuses them by name: batches,
-                and what computes by them, such as sweeps and designs; MuJoCo models; ARM.toml.
+                `∂U/∂θ` (nv,) and ``stiffness(pose)`` `∂²U/∂θ²` (nv, nv), as in ``cdsm/terms.py``.
+                They count in balance and `K_θ`. What cannot take them refuses them by name:
+                batches, and what computes by them, such as sweeps and designs; MuJoCo models;
+                ARM.toml.
 
         Raises:
             InvalidInput: An object is no term, or a name is in use.
@@ -339,10 +340,10 @@ class Manipulator(ComputedArm):
     def with_motors(self, motors: Sequence[Motor]) -> Manipulator:
         """Return the same arm whose cables are moved by these motors.
 
-        A cable that none of them names has a rigid motor of its own. Rigid motors leave K_θ as it
+        A cable that none of them names has a rigid motor of its own. Rigid motors leave `K_θ` as it
         is, whatever they move together: only which tensions they can reach differs. Motors that
-        yield soften it: with B (C, M) [m/rad] = ``arm.motors.matrix`` and K_L = diag k, its passive
-        term is J_Lᵀ K_eff J_L, K_eff = K_L − K_L B (k_m + Bᵀ K_L B)⁻¹ Bᵀ K_L.
+        yield soften it: with B (C, M) [m/rad] = ``arm.motors.matrix`` and `K_L = diag k`, its
+        passive term is `J_Lᵀ K_eff J_L`, `K_eff = K_L − K_L B (k_m + Bᵀ K_L B)⁻¹ Bᵀ K_L`.
 
         Args:
             motors: Motors with the radii of the drums by cable; none: one for each cable.
@@ -387,7 +388,7 @@ class Manipulator(ComputedArm):
     def assemble(self, pose: Posture, tension: ArrayLike) -> Assembly:
         """Return how long the wires are that have these tensions at a posture, with motors at 0.
 
-        Motors that are fewer than cables keep Nᵀ l_0 of it (Nᵀ B = 0): what they can do later,
+        Motors that are fewer than cables keep `Nᵀ l_0` of it (`Nᵀ B = 0`): what they can do later,
         :func:`~cdsm.distribute_tension` and :func:`~cdsm.forward_statics` say with ``assembly=``.
 
         Args:

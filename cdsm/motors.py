@@ -46,8 +46,8 @@ class Motor:
         cables: Radius [m] of the drum of each cable by the cable's name: wire taken in per turn.
             A negative one lets wire out: ``{"left": 0.012, "right": -0.012}`` is a spool with two
             cables against each other. A cable may hang on several motors.
-        stiffness: k_m [N m/rad] of gears and servo loop; inf: it holds its angle exactly.
-        control: What it keeps constant: ``"position"``: its angle; ``"torque"``: its torque Bᵀ F,
+        stiffness: `k_m` [N m/rad] of gears and servo loop; inf: it holds its angle exactly.
+        control: What it keeps constant: ``"position"``: its angle; ``"torque"``: its torque `Bᵀ F`,
             by which it yields to every change of length that leaves its torque.
 
     Raises InvalidInput, which names the motor and the fault.
@@ -96,7 +96,7 @@ class Motor:
         return self.control == "torque" or math.isfinite(self.stiffness)
 
     def can_give(self, torque: float) -> bool:
-        """Whether cables that only pull have the torque Bᵀ F [N m] under any tensions."""
+        """Whether cables that only pull have the torque `Bᵀ F` [N m] under any tensions."""
         return any(torque * radius >= 0.0 for radius in self.cables.values())
 
     def __str__(self) -> str:
@@ -218,7 +218,7 @@ class Motors(Printed):
 
     @cached_property
     def compliance(self) -> Array:
-        """B k_m⁻¹ Bᵀ (C, C) [m/N], which the motors add to the compliance of the cables.
+        """`B k_m⁻¹ Bᵀ` (C, C) [m/N], which the motors add to the compliance of the cables.
 
         It is ±inf between cables of a motor that holds its torque.
         """
@@ -235,7 +235,7 @@ class Motors(Printed):
 
     @cached_property
     def fixed(self) -> Array:
-        """N (C, C − M), orthonormal: Nᵀ B = 0. No motor changes Nᵀ l_0; assembly has set it."""
+        """N (C, C − M), orthonormal: `Nᵀ B = 0`. No motor changes `Nᵀ l_0`; assembly has set it."""
         return frozen(np.linalg.svd(self.matrix)[0][:, len(self) :].copy())
 
     def require_independent(self) -> None:

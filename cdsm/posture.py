@@ -40,12 +40,13 @@ class Posture(ReadOnlyState):
         arm: The arm.
         q: Joint angles (nv,) [rad].
         tip: Pose of ``tool0`` (4, 4), translation in m (Eqs. 3–4).
-        jacobian: J_X (6, nv) at ``tool0``: linear rows [m/rad] first, then angular rows.
+        jacobian: `J_X` (6, nv) at ``tool0``: linear rows [m/rad] first, then angular rows.
         cable_lengths: L (C,) [m], lead included (Eq. 8).
-        length_jacobian: J_L = ∂L/∂θ (C, nv) [m/rad].
-        gravity_torque: g = ∂V/∂θ (nv,) [N m] with the potential energy V: J_Hᵀ G_g of Eq. 13.
-        gravity_stiffness: ∂g/∂θ (nv, nv) [N m/rad]: H_H G_g of Eq. 16.
-        twist: (v, z) (6, n) of all n joints: a point x that joint j moves has ∂x/∂θ_j = v + z × x.
+        length_jacobian: `J_L = ∂L/∂θ` (C, nv) [m/rad].
+        gravity_torque: `g = ∂V/∂θ` (nv,) [N m] with the potential energy V: `J_Hᵀ G_g` of Eq. 13.
+        gravity_stiffness: `∂g/∂θ` (nv, nv) [N m/rad]: `H_H G_g` of Eq. 16.
+        twist: (v, z) (6, n) of all n joints: a point x that joint j moves has
+            `∂x/∂θ_j = v + z × x`.
         placements: Poses (n+1, 4, 4) of the base and of the joints' frames.
         sites: Positions (3, P) [m] of the sites of all cables, and of their contacts with pulleys.
         spans: Segments of all cables, with their motions.
@@ -125,7 +126,7 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def length_hessian(self) -> Array:
-        """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], computed on first use."""
+        """`H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j` (C, nv, nv) [m/rad²], computed on first use."""
         routing = self.routing
         one = np.ones(routing.cable.size)
         count = len(self.cable_lengths)
@@ -203,7 +204,7 @@ class Posture(ReadOnlyState):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What makes K_θ doubtful here: cables about to leave their pulleys, springs at rest."""
+        """What makes `K_θ` doubtful here: cables about to leave their pulleys, springs at rest."""
         return *(self.wrapping.remarks if self.wrapping else ()), *self.arm.springs.doubts(self.q)
 
     @property
@@ -228,7 +229,7 @@ class Posture(ReadOnlyState):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class MomentArms(Result):
-    """Moment arm of each cable about each joint, −J_L: torque per tension, τ = −J_Lᵀ F (Eq. 13).
+    """Moment arm of each cable about each joint, `−J_L`: torque per tension `τ = −J_Lᵀ F`, Eq. 13.
 
     A cable with a positive moment arm turns the joint to positive angles. The moment arm of one
     cable about one joint is ``arms["cable1_1", "joint1_1"]``.

@@ -51,7 +51,7 @@ class Quantity(NamedTuple):
 
     needs: Needs  # what must exist
     words: str  # its name in words
-    definition: str = ""  # what it is, in words or as a formula
+    definition: str = ""  # what it is, in words; formulas in backquotes
     unit: str = "1"  # SI, or a key of UNITS_OF_JOINTS; 1 also if the entries have different units
     dims: tuple[str, ...] = ()  # after those of the postures
     best: Literal["most", "least"] | None = None  # which end a design prefers; None: neither
@@ -65,7 +65,7 @@ class Quantity(NamedTuple):
     @property
     def text(self) -> str:
         """Words and definition in one line."""
-        return f"{self.words}, {self.definition}" if self.definition else self.words
+        return ", ".join(filter(None, (self.words, self.definition.replace("`", ""))))
 
     @property
     def si_unit(self) -> str:
@@ -107,25 +107,26 @@ QUANTITIES: Final[dict[str, Quantity]] = {
         outputs=_UNCERTAINTY, reads=("tip",),
         compute=lambda tip, direction: tip[..., :3, 3] @ direction.T),
     "jacobian": Quantity(
-        "posture", "tip Jacobian", "J_X", "1", ("motion", "joint"),
+        "posture", "tip Jacobian", "`J_X`", "1", ("motion", "joint"),
         outputs=_BATCH),
     "cable_lengths": Quantity(
         "posture", "cable lengths", "L with the leads (Eq. 8)", "m", ("cable",),
         outputs=_ARRAYS),
     "length_jacobian": Quantity(
-        "posture", "Jacobian of the cable lengths", "J_L = ∂L/∂θ", "lever", ("cable", "joint"),
+        "posture", "Jacobian of the cable lengths", "`J_L = ∂L/∂θ`", "lever", ("cable", "joint"),
         outputs=_BATCH),
     "gravity_torque": Quantity(
-        "posture", "gravity torque", "g = ∂V/∂θ", "torque", ("joint",),
+        "posture", "gravity torque", "`g = ∂V/∂θ`", "torque", ("joint",),
         outputs=_ARRAYS),
     "gravity": Quantity(
-        "posture", "gravity term of the joint stiffness", "∂g/∂θ (Eq. 16)", _K, JOINT_DIMS,
+        "posture", "gravity term of the joint stiffness", "`∂g/∂θ` (Eq. 16)", _K, JOINT_DIMS,
         outputs=_ARRAYS),
     "springs": Quantity(
         "posture", "spring term of the joint stiffness", "of the joint springs", _K, JOINT_DIMS,
         outputs=_ARRAYS),
     "tension_factor": Quantity(
-        "posture", "tension factor", "largest min F/max F with J_Lᵀ F = 0; 0: no wrench closure",
+        "posture", "tension factor",
+        "largest `min F/max F` with `J_Lᵀ F = 0`; 0: no wrench closure",
         best="most", outputs=_GOALS, is_slow=True),
     "cable_clearance": Quantity(
         "posture", "clearance between cables", "", "m",
@@ -140,13 +141,13 @@ QUANTITIES: Final[dict[str, Quantity]] = {
         "tension", "tension", "least F in balance, the forces of the motors (Eq. 17)", "N",
         ("cable",), best="least", outputs=_ALL),
     "residual": Quantity(
-        "tension", "residual of the balance", "J_Lᵀ F − (J_Xᵀ W − g) + k (q − q_0)", "torque",
+        "tension", "residual of the balance", "`J_Lᵀ F − (J_Xᵀ W − g) + k (q − q_0)`", "torque",
         ("joint",), outputs=_BATCH),
     "active": Quantity(
-        "tension", "active term of the joint stiffness", "H_L·F (Eq. 16)", _K, JOINT_DIMS,
+        "tension", "active term of the joint stiffness", "`H_L·F` (Eq. 16)", _K, JOINT_DIMS,
         outputs=_ARRAYS),
     "load": Quantity(
-        "tension", "load term of the joint stiffness", "−∂(J_Xᵀ W)/∂θ (Eq. 16)", _K, JOINT_DIMS,
+        "tension", "load term of the joint stiffness", "`−∂(J_Xᵀ W)/∂θ` (Eq. 16)", _K, JOINT_DIMS,
         outputs=_ARRAYS),
     "payload": Quantity(
         "tension", "payload along a direction", _BOUNDED, "N", ("direction",),
@@ -155,40 +156,40 @@ QUANTITIES: Final[dict[str, Quantity]] = {
         "tension", "payload in any direction", _BOUNDED, "N",
         best="most", outputs=_GOALS, is_slow=True),
     "cable_stiffness": Quantity(
-        "stiffness", "cable stiffness", "diagonal of K_L", "N/m", ("cable",),
+        "stiffness", "cable stiffness", "diagonal of `K_L`", "N/m", ("cable",),
         outputs=_ARRAYS),
     "passive": Quantity(
-        "stiffness", "passive term of the joint stiffness", "J_Lᵀ K_L J_L (Eq. 16)", _K, JOINT_DIMS,
-        outputs=_ARRAYS),
+        "stiffness", "passive term of the joint stiffness", "`J_Lᵀ K_L J_L` (Eq. 16)", _K,
+        JOINT_DIMS, outputs=_ARRAYS),
     "joint": Quantity(
-        "stiffness", "joint stiffness", "K_θ (Eq. 16)", _K, JOINT_DIMS,
+        "stiffness", "joint stiffness", "`K_θ` (Eq. 16)", _K, JOINT_DIMS,
         outputs=_BATCH),
     "joint_stiffness": Quantity(  # no variable of a Dataset may have the name of a dimension
-        "stiffness", "joint stiffness", "K_θ (Eq. 16)", _K, JOINT_DIMS,
+        "stiffness", "joint stiffness", "`K_θ` (Eq. 16)", _K, JOINT_DIMS,
         outputs=_SWEEP, reads=("joint",), compute=lambda joint: joint),
     "margin": Quantity(
-        "stiffness", "smallest joint stiffness", "smallest eigenvalue of the symmetric part of K_θ",
-        _K, best="most", outputs=_ALL),
+        "stiffness", "smallest joint stiffness",
+        "smallest eigenvalue of the symmetric part of `K_θ`", _K, best="most", outputs=_ALL),
     "pseudoinverse": Quantity(
-        "stiffness", "the paper's Cartesian stiffness", "J⁺ᵀ K_θ J⁺", "N/m", AXIS_DIMS,
+        "stiffness", "the paper's Cartesian stiffness", "`J⁺ᵀ K_θ J⁺`", "N/m", AXIS_DIMS,
         outputs=_ARRAYS),
     "along": Quantity(
-        "stiffness", "stiffness along a direction", "1/(uᵀ C_vv u) (Eq. 20)", "N/m",
+        "stiffness", "stiffness along a direction", "`1/(uᵀ C_vv u)` (Eq. 20)", "N/m",
         ("direction",), best="most", outputs=_ALL),
     "slack": Quantity(
         "stiffness", "whether a cable is at 0 N", "along is then one-sided, all else two-sided",
         outputs=_ARRAYS, is_flag=True),
     "compliance": Quantity(
-        "stiffness", "compliance", "C = J_X K_θ⁻¹ J_Xᵀ, tip motion per wrench", "1", MOTION_DIMS,
+        "stiffness", "compliance", "`C = J_X K_θ⁻¹ J_Xᵀ`, tip motion per wrench", "1", MOTION_DIMS,
         outputs=_ARRAYS),
     "translational_compliance": Quantity(
-        "stiffness", "translational compliance", "C_vv, tip motion per force", "m/N", AXIS_DIMS,
+        "stiffness", "translational compliance", "`C_vv`, tip motion per force", "m/N", AXIS_DIMS,
         outputs=_SWEEP, reads=("compliance",), compute=lambda compliance: compliance[..., :3, :3]),
     "cartesian": Quantity(
-        "stiffness", "Cartesian stiffness", "inverse of C_vv", "N/m", AXIS_DIMS,
+        "stiffness", "Cartesian stiffness", "inverse of `C_vv`", "N/m", AXIS_DIMS,
         outputs=_ARRAYS),
     "deflection": Quantity(
-        "stiffness", "first-order deflection under the load", "|C_vv f|, motors locked", "m",
+        "stiffness", "first-order deflection under the load", "`|C_vv f|`, motors locked", "m",
         best="least", outputs=_DESIGN, reads=("translational_compliance",)),
     "softest": Quantity(
         "stable arm", "stiffness in the softest direction", "", "N/m",

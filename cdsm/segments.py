@@ -138,10 +138,10 @@ class Segments(ReadOnlyState):
     Attributes:
         chains: The segments and holes, with the cable of each.
         lengths: Length l of each segment (S,) [m].
-        length_jacobian: ∂l/∂θ (S, nv) [m/rad]; zero for leads and segments within one link.
+        length_jacobian: `∂l/∂θ` (S, nv) [m/rad]; zero for leads and segments within one link.
         wrap: Wrap angle φ at each hole (P,) [rad]: the angle by which the cable turns there, plus
             :attr:`Site.wrap`.
-        wrap_jacobian: ∂φ/∂θ (P, nv) [rad/rad]; 0 where the cable goes straight through.
+        wrap_jacobian: `∂φ/∂θ` (P, nv) [rad/rad]; 0 where the cable goes straight through.
     """
 
     chains: Chains
@@ -156,14 +156,14 @@ class Segments(ReadOnlyState):
     def at(cls, chains: Chains, twist: Array, placement: Array) -> Self:
         """Compute the segments from the world twists and the poses of the joints' frames.
 
-        With the directions u and v before and behind a hole, φ = atan2(|u × v|, u·v) and
+        With the directions u and v before and behind a hole, `φ = atan2(|u × v|, u·v)` and
 
-            ∂φ/∂θ_i = −(p·d_i/ℓ_u + q·e_i/ℓ_v),
-            p = ((u × v) × u)/|u × v|,   q = (v × (u × v))/|u × v|.
+            `∂φ/∂θ_i = −(p·d_i/ℓ_u + q·e_i/ℓ_v)`,
+            `p = ((u × v) × u)/|u × v|`,   `q = (v × (u × v))/|u × v|`.
 
-        d_i and e_i are the motions of the segments' far ends, seen from the link of the hole. Where
-        the cable goes straight through, φ has a kink; there the gradient is 0, the mean of both
-        sides.
+        `d_i` and `e_i` are the motions of the segments' far ends, seen from the link of the hole.
+        Where the cable goes straight through, φ has a kink; there the gradient is 0, the mean of
+        both sides.
         """
         if chains.paths is not None:
             return cls._over_pulleys(chains, chains.paths.at(twist, placement))
@@ -210,7 +210,7 @@ class Segments(ReadOnlyState):
         """Product μ φ of friction coefficient and wrap angle at each hole (P,) [-].
 
         A cable sticks in a hole while the larger of the tensions before and behind the hole is
-        below e^μφ times the smaller one.
+        below `e^{μφ}` times the smaller one.
         """
         return self.chains.friction * self.wrap
 
@@ -231,7 +231,7 @@ class Segments(ReadOnlyState):
 
     @property
     def ratio(self) -> Array:
-        """Largest ratio T_{j+1}/T_j (S,) [-] that the hole after segment j allows: e^μφ.
+        """Largest ratio `T_{j+1}/T_j` (S,) [-] that the hole after segment j allows: `e^{μφ}`.
 
         The entry is 1 for the last segment of a cable, which has no hole after it.
         """
@@ -240,9 +240,9 @@ class Segments(ReadOnlyState):
         return ratios
 
     def tension_stiffness(self, tension: Array) -> Array:
-        """Compute Σ T_j ∂²l_j/∂θ² [N m/rad] over the segments j of each cable, (C, nv, nv).
+        """Compute `Σ T_j ∂²l_j/∂θ²` [N m/rad] over the segments j of each cable, (C, nv, nv).
 
-        It is the cable's part of the active term of K_θ. ``tension`` is T (S,) [N].
+        It is the cable's part of the active term of `K_θ`. ``tension`` is T (S,) [N].
         """
         cable = self.chains.cable
         count = int(cable[-1]) + 1
@@ -252,7 +252,7 @@ class Segments(ReadOnlyState):
         return frozen(self.chains.routing.hessians(self._spans, tension, cable, count))
 
     def active(self, tension: Array) -> Array:
-        """Compute the active term Σ T_j ∂²l_j/∂θ² (nv, nv) [N m/rad] of all segments."""
+        """Compute the active term `Σ T_j ∂²l_j/∂θ²` (nv, nv) [N m/rad] of all segments."""
         if self._curvature is not None:
             return frozen(self._curvature.hessian(tension))
         assert self._spans is not None

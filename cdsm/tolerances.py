@@ -74,7 +74,7 @@ class Tolerance:
 
     @classmethod
     def within(cls, half_width: float, *, correlation: float = 0.0, of: str = EVERY) -> Self:
-        """Return the tolerance of values surely within ±a: uniform, u = a/√3 (JCGM 100, 4.3.7)."""
+        """Return the tolerance of values surely within ±a: `u = a/√3` (JCGM 100, 4.3.7)."""
         standard = scalar("half_width", half_width) / math.sqrt(3.0)
         return cls(standard, distribution="uniform", correlation=correlation, of=of)
 
@@ -97,7 +97,7 @@ class Tolerances:
 
     Args:
         rigidity: EA of the law of each cable; relative [-].
-        spring: k_series in series with each cable, such as its anchor or drive; relative [-].
+        spring: `k_series` in series with each cable, such as its anchor or drive; relative [-].
         joint_stiffness: k of the spring of each joint, those of beams included; relative [-]. Of a
             spring with a law, it is that of all torques.
         exponent: Exponent of each spring with a law that is a power [-].
@@ -109,7 +109,7 @@ class Tolerances:
         pulley_radius: Radius of the pulleys of each cable [m], one error for all of a cable.
         slack: Wire that each motor takes in before its cable pulls [m].
         gain: Wire taken in per pull that each motor reports [-].
-        motor_stiffness: k_m of each motor that has one; relative [-].
+        motor_stiffness: `k_m` of each motor that has one; relative [-].
         hole_radius: Distance of each hole from the axis of its link [m].
         hole_angle: Angle of each hole about the axis of its link [rad].
         disk_offset: Distance of each disk from its joint [m]; place of a backbone's disk.

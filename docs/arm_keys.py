@@ -1,4 +1,4 @@
-"""Print the table of the keys of ARM.toml, from docstrings: ``python docs/arm_keys.py``.
+"""Print the table of the keys of ARM.toml, from docstrings: ``python -m docs.arm_keys``.
 
 It stands in ``docs/guide/arm_file.md``; a test compares both.
 """
@@ -11,9 +11,10 @@ from cdsm.arm_file.model import ArmFile, Urdf
 from cdsm.cable import SETTINGS
 from cdsm.geometry.beams import Section
 from cdsm.support.described import attributes_of
+from docs.formulas import typeset
 
 _ROLLING = {
-    "radius": "Radius [m] of the round end before each joint; other keys as in `[hinged]`.",
+    "radius": "Radius [m] of the round end before each joint; other keys as in ``[hinged]``.",
     "second_radius": "Radius [m] of the round end that rolls on it; the same if it is left out.",
 }
 
@@ -52,7 +53,7 @@ def table() -> str:
 
 def _rows(where: str, meanings: Mapping[str, str]) -> Iterable[str]:
     for key, meaning in meanings.items():
-        plain = re.sub(r":\w+:`~?(?:cdsm\.)?([^`]*)`", r"`\1`", meaning).replace("``", "`")
+        plain = re.sub(r":\w+:`~?(?:cdsm\.)?([^`]*)`", r"`\1`", typeset(meaning)).replace("``", "`")
         yield f"| {where} | `{key}` | {plain.replace('|', '&#124;')} |"
 
 

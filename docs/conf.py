@@ -15,7 +15,9 @@ from sphinx.util.inspect import TypeAliasForwardRef
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent), str(HERE)]
 
+import formulas
 import quantities
+from docutils import nodes
 
 import cdsm
 
@@ -80,6 +82,7 @@ myst_heading_anchors = 3
 nb_execution_mode = "off"  # notebooks are committed with their outputs
 nb_merge_streams = True
 
+default_role = "formula"
 autosummary_ignore_module_all = False
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
@@ -103,14 +106,11 @@ copybutton_prompt_text = r"\$ |>>> "
 copybutton_prompt_is_regexp = True
 
 
-def _escape(
-    app: Sphinx, kind: str, name: str, thing: object, options: object, lines: list[str]
-) -> None:
-    """Keep the bars of ``|x|`` in docstrings, which are absolute values."""
-    for i, line in enumerate(lines):
-        parts = line.split("``")
-        parts[::2] = [part.replace("|", r"\|") for part in parts[::2]]
-        lines[i] = "``".join(parts)
+def _formula(
+    role: str, marked: str, text: str, line: int, *_: object
+) -> tuple[list[nodes.Node], list[nodes.system_message]]:
+    """Typeset what stands in single backquotes."""
+    return [nodes.math(marked, formulas.latex(text))], []
 
 
 def _keep_colon(
@@ -131,5 +131,5 @@ def _shorten(*event: object) -> tuple[str, str] | None:
 def setup(app: Sphinx) -> None:
     """Connect what docstrings need."""
     app.connect("autodoc-process-docstring", _keep_colon, priority=400)  # before napoleon
-    app.connect("autodoc-process-docstring", _escape)
+    app.add_role("formula", _formula)
     app.connect("autodoc-process-signature", _shorten)

@@ -69,7 +69,7 @@ def distribute_tensions(
     check_limits: bool = True,
     threads: int | None = None,
 ) -> Tensions:
-    """Compute the least tensions that balance an arm at B postures: min ‖F‖² (Eqs. 13, 17).
+    """Compute the least tensions that balance an arm at B postures: `min ‖F‖²` (Eqs. 13, 17).
 
     Tensions are accepted only if they meet the optimality conditions of
     :func:`~cdsm.distribute_tension`. A posture gets the status ``INFEASIBLE`` only with a proof.

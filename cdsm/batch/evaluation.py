@@ -38,7 +38,7 @@ DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Batch(OfPostures, IndexedByName):
-    """Quantities at B postures: ``batch["joint"]`` is K_θ (B, nv, nv); ``len(batch)`` is B.
+    """Quantities at B postures: ``batch["joint"]`` is `K_θ` (B, nv, nv); ``len(batch)`` is B.
 
     The keys are the names in :attr:`outputs`; ``"joint" in batch``, ``list(batch)`` and
     ``dict(batch)`` use them too. Names, shapes and units are as in :class:`~cdsm.Posture` and

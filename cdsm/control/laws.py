@@ -44,7 +44,7 @@ class Reference(NamedTuple):
     Attributes:
         angles: Joint angles (nv,) [rad]; [m] for prismatic joints.
         tension: F (C,) [N].
-        paid_out: l_0 at these angles and tensions (C,) [m].
+        paid_out: `l_0` at these angles and tensions (C,) [m].
         stiffness: k of each cable (C,) [N/m]; 0 for force-controlled cables.
     """
 
@@ -58,7 +58,7 @@ class Command(NamedTuple):
     """Command to the motors at one step.
 
     Attributes:
-        paid_out: l_0 to pay out (C,) [m].
+        paid_out: `l_0` to pay out (C,) [m].
         tension: Predicted tension after the step (C,) [N], within the bounds.
         saturated: Whether the command of each motor was changed to keep its tension within the
             bounds (C,).
@@ -77,7 +77,7 @@ class ControlInput(NamedTuple):
         reference_before: Reference of the previous step, after which the sensors were read.
         measurement: What the sensors say.
         error_before: :attr:`error` of the previous step (C,) [N].
-        paid_out: l_0 commanded at the previous step (C,) [m].
+        paid_out: `l_0` commanded at the previous step (C,) [m].
         minimum: Lower bounds of the tensions (C,) [N].
         maximum: Upper bounds of the tensions (C,) [N].
         tension_controlled: True for each cable (C,) whose tension a mixed law controls; of the
@@ -95,7 +95,7 @@ class ControlInput(NamedTuple):
 
     @property
     def error(self) -> Array:
-        """Tension error e = F planned − F measured after the previous step (C,) [N]."""
+        """Tension error e (C,) [N] after the previous step: planned less measured."""
         return np.asarray(self.reference_before.tension - self.measurement.tension)
 
 
@@ -104,7 +104,7 @@ Law = Callable[[ControlInput], Command]
 
 
 def limited(control_input: ControlInput, paid_out: Array) -> Command:
-    """Return the command to pay out l_0 (C,) [m], changed to keep the tensions within the bounds.
+    """Return the command to pay out `l_0` (C,) [m], changed to keep the tensions within the bounds.
 
     The tensions after the step are predicted as the top of the module says. Raises InvalidInput if
     ``paid_out`` is not one number per cable.
@@ -121,7 +121,7 @@ def limited(control_input: ControlInput, paid_out: Array) -> Command:
 def feedforward(control_input: ControlInput) -> Command:
     """Pay out the lengths of wire of the plan; this law needs no sensor.
 
-    The planned l_0 allow for the stretch of the wires under the planned tensions.
+    The planned `l_0` allow for the stretch of the wires under the planned tensions.
     """
     return _clamped(
         control_input, control_input.reference.paid_out, control_input.reference.tension
@@ -129,12 +129,12 @@ def feedforward(control_input: ControlInput) -> Command:
 
 
 def tension_control(control_input: ControlInput) -> Command:
-    """Control all cable tensions by PI control, in addition to the planned changes of l_0.
+    """Control all cable tensions by PI control, in addition to the planned changes of `l_0`.
 
-    In each step, Δl_0 = Δl_0 planned − (P Δe + I e)/k with the tension error e, its change Δe since
-    the previous step, and the cable stiffness k. P and I are PROPORTIONAL and INTEGRAL. Every cable
-    needs a load cell. No motor controls a length, so an arm without springs in its joints drifts
-    slowly from its posture.
+    In each step, `(P Δe + I e)/k` is taken from the planned change `Δl_0`, with the tension error
+    e, its change Δe since the previous step, and the cable stiffness k. P and I are PROPORTIONAL
+    and INTEGRAL. Every cable needs a load cell. No motor controls a length, so an arm without
+    springs in its joints drifts slowly from its posture.
     """
     return limited(control_input, _regulated(control_input))
 

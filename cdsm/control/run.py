@@ -60,7 +60,7 @@ class TrackingRun(Result, Plotted):
         saturated: Whether the command of each motor was changed to keep its tension within the
             bounds (n, C).
         stiffness: True stiffness along each direction (n, D) [N/m].
-        margin: Smallest eigenvalue of the true K_θ (n,) [N m/rad].
+        margin: Smallest eigenvalue of the true `K_θ` (n,) [N m/rad].
         band: Half-width of the first-order band of ``displacement`` (n,) [m]; NaN without friction,
             and where there is no stable equilibrium.
         displacement: Displacement of the tip from the equilibrium without friction along the first

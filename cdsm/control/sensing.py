@@ -43,7 +43,7 @@ class MotorMeasurement(NamedTuple):
     """Values at the motors at one step, as measured or true.
 
     Attributes:
-        paid_out: l_0 paid out by each motor (C,) [m], from its encoder.
+        paid_out: `l_0` paid out by each motor (C,) [m], from its encoder.
         tension: F at each motor (C,) [N].
     """
 
@@ -57,7 +57,7 @@ class Sensors:
     """Sensors of all motors: an encoder for the wire and a load cell for the tension.
 
     Encoders count from where the cable is just taut (zero strain) at a known posture, so they
-    measure the rest length l_0 that is paid out.
+    measure the rest length `l_0` that is paid out.
 
     Attributes:
         encoder: Length [m] of one count of an encoder; 0: exact.

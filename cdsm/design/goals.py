@@ -84,17 +84,17 @@ class Objective(Measure):
         of: ``"along"``, ``"softest"``, ``"margin"``, ``"deflection"``, ``"tension"``,
             ``"payload"``, ``"force_radius"``, ``"tension_factor"``, ``"cable_clearance"``,
             ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``, ``"held"``, ``"mass"``,
-            ``"length"`` or ``"wire_length"``. A posture is held under a load if tensions within
-            the bounds balance it and the arm is stable. If the value depends on posture or load,
-            it is the worst one over all that are held. ``along``, ``softest`` and ``margin``
-            are computed with the least tensions under the load. ``deflection`` is |C_vv f| with the
-            force f of the load, to first order. Its C_vv is computed with the least tensions
-            without the load, since the motors are locked before the load acts, as in
-            :func:`~cdsm.payload` and :func:`~cdsm.weight_test`. The deflection is inf if the arm is
-            not held without load. ``payload`` is the largest force along u that tensions within the
-            bounds balance in addition to the load; ``force_radius`` is the largest force that
-            they balance in every direction. ``workspace`` is the volume of the convex hull of the
-            tips of held postures, ``held`` the fraction of pairs of posture and load that are held.
+            ``"length"`` or ``"wire_length"``. A posture is held under a load if tensions within the
+            bounds balance it and the arm is stable. If the value depends on posture or load, it is
+            the worst one over all that are held. ``along``, ``softest`` and ``margin`` are computed
+            with the least tensions under the load. ``deflection`` is `|C_vv f|` with the force f of
+            the load, to first order. Its `C_vv` is computed with the least tensions without the
+            load, since the motors are locked before the load acts, as in :func:`~cdsm.payload` and
+            :func:`~cdsm.weight_test`. The deflection is inf if the arm is not held without load.
+            ``payload`` is the largest force along u that tensions within the bounds balance in
+            addition to the load; ``force_radius`` is the largest force that they balance in every
+            direction. ``workspace`` is the volume of the convex hull of the tips of held postures,
+            ``held`` the fraction of pairs of posture and load that are held.
             :func:`~cdsm.clearance` defines clearances.
         direction: u of ``along`` and ``payload``: an axis such as ``"-z"``, or (3,).
         goal: ``"most"`` to maximise, ``"least"`` to minimise; None: the usual one, e.g. the most

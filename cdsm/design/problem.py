@@ -37,9 +37,9 @@ MISSED = "held"
 class DesignProblem(ReadOnlyState):
     """Design problem: variables of an arm, objectives, constraints; the argument of all searches.
 
-    A posture is held if tensions within the bounds balance the arm under the load, and K_θ is then
-    positive definite. A design must hold all postures under all loads, unless an objective or a
-    constraint is on ``held`` or ``workspace``.
+    A posture is held if tensions within the bounds balance the arm under the load, and `K_θ` is
+    then positive definite. A design must hold all postures under all loads, unless an objective or
+    a constraint is on ``held`` or ``workspace``.
 
     Attributes:
         arm: The arm that is changed; it was made from a Geometry.

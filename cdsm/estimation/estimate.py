@@ -59,11 +59,11 @@ def estimate_load(
 ) -> LoadEstimate:
     """Estimate loads on links from the tensions at the motors and the joint angles.
 
-    Behind hole i of a cable the tension is e^{s_i} times that before it, with |s_i| ≤ μ β_i. With
-    T_j = F_c exp(Σ s_i) of each segment, its gradient g_j, and errors of F and θ, the loads follow
-    from the balance by weighted least squares:
+    Behind hole i of a cable the tension is `e^{s_i}` times that before it, with `|s_i| ≤ μ β_i`.
+    With `T_j = F_c exp(Σ s_i)` of each segment, its gradient `g_j`, and errors of F and θ, the
+    loads follow from the balance by weighted least squares:
 
-        Σ_j T_j g_j + g + springs = Σ_k J_kᵀ W_k.
+        `Σ_j T_j g_j + g + springs = Σ_k J_kᵀ W_k`.
 
     ``std`` of the result is what the instruments leave unknown, ``band`` what friction of unknown
     direction can hide at most. Which combinations of components are told how well is ``seen``;
@@ -152,10 +152,10 @@ def estimate_tensions(
 ) -> TensionEstimate:
     """Estimate the tensions of all segments from those at the motors, without unknown loads.
 
-    By friction alone T_j is within F e^{±Σ μ β} of the holes before it. The balance of the joints,
-    with ``wrench`` as the only load, narrows this, and so does the direction in which cables slid.
-    Arguments and errors are those of :func:`estimate_load`, which gives these numbers too, where
-    loads are unknown.
+    By friction alone `T_j` is within `F e^{±Σ μ β}` of the holes before it. The balance of the
+    joints, with ``wrench`` as the only load, narrows this, and so does the direction in which
+    cables slid. Arguments and errors are those of :func:`estimate_load`, which gives these numbers
+    too, where loads are unknown.
 
     Example:
         >>> import cdsm

@@ -199,7 +199,7 @@ class LoadEstimate(TensionEstimate, Plotted):
 
     @quantity("N or N m", "load_component")
     def uncertainty(self) -> Array:
-        """Standard uncertainty with friction, √(std² + band²/3) (m,): JCGM 100, a bound."""
+        """Standard uncertainty with friction, `√(std² + band²/3)` (m,): JCGM 100, a bound."""
         return frozen(np.hypot(self.std, self.band / math.sqrt(3.0)))
 
     @quantity("1", "load_component", "other_component")

@@ -70,12 +70,13 @@ def stuck_stiffness(
 ) -> Stiffness:
     """Compute the stiffness while all cables stick: weights below :func:`breakaway` measure it.
 
-    Each segment j between two holes is a separate spring k_j = EA(F)/a_j with the length l_j and
-    the rest length a_j: K_θ = Σ_j (F H_j + k_j g_j g_jᵀ) + gravity + load, with g_j = ∂l_j/∂θ and
-    H_j = ∂²l_j/∂θ². If the cable sticks in its first hole, lead, series spring and force-controlled
-    motor have no effect. A cable cannot stick in a hole without friction, or through which it goes
-    straight: the segments on both sides are one spring. Without friction, K_θ is that of
-    :func:`~cdsm.stiffness`; with it, larger: the difference is positive semidefinite.
+    Each segment j between two holes is a separate spring `k_j = EA(F)/a_j` with the length `l_j`
+    and the rest length `a_j`: `K_θ = Σ_j (F H_j + k_j g_j g_jᵀ) + gravity + load`, with
+    `g_j = ∂l_j/∂θ` and `H_j = ∂²l_j/∂θ²`. If the cable sticks in its first hole, lead, series
+    spring and force-controlled motor have no effect. A cable cannot stick in a hole without
+    friction, or through which it goes straight: the segments on both sides are one spring. Without
+    friction, `K_θ` is that of :func:`~cdsm.stiffness`; with it, larger: the difference is positive
+    semidefinite.
 
     :func:`~cdsm.stiffness` explains the arguments and the errors.
 
@@ -106,12 +107,12 @@ def breakaway(
     """Compute the force along a direction at which the first cable begins to slide in a hole.
 
     A weight below this load measures :func:`stuck_stiffness`. The cable begins to slide in hole i,
-    between segments j and j + 1 with the tensions T, where |ln T_{j+1} − ln T_j| = μ φ_i, with the
-    friction coefficient μ and the wrap angle φ_i. The stuck arm is at θ + W dθ/dW under the load W,
-    and dθ/dW = K_θ⁻¹ J_vᵀ u is taken at half the first-order load; on random arms the result is
-    within 1e-4 of a simulated one up to μ = 0.3. To first order it is the smallest of
+    between segments j and j + 1 with the tensions T, where `|ln T_{j+1} − ln T_j| = μ φ_i`, with
+    the friction coefficient μ and the wrap angle `φ_i`. The stuck arm is at `θ + W dθ/dW` under the
+    load W, and `dθ/dW = K_θ⁻¹ J_vᵀ u` is taken at half the first-order load; on random arms the
+    result is within 1e-4 of a simulated one up to μ = 0.3. To first order it is the smallest of
 
-        W_i = μ φ_i/(|x_i| − y_i),   x_i = d(ln T_{j+1} − ln T_j)/dW,   y_i = μ dφ_i/dW.
+        `W_i = μ φ_i/(|x_i| − y_i)`,   `x_i = d(ln T_{j+1} − ln T_j)/dW`,   `y_i = μ dφ_i/dW`.
 
     Args:
         pose: The posture.
@@ -277,7 +278,7 @@ def rest_band(
     the arm, the wrap angles and the laws EA(F) are linearised at the reference.
 
     Arguments and errors are those of :func:`breakaway`; ``wrench`` is the load that acts now, and
-    ``direction`` that of the displacement. SingularStiffness also if the frictionless K_θ is.
+    ``direction`` that of the displacement. SingularStiffness also if the frictionless `K_θ` is.
 
     Example:
         >>> import cdsm

@@ -56,7 +56,7 @@ class Geometry(Printed):
 
     Attributes:
         name: Name of the robot: letters, digits and underscores.
-        base_length: L_0: distance from the base frame to joint 1 [m].
+        base_length: `L_0`: distance from the base frame to joint 1 [m].
         hole_radius: R: distance of the holes from the arm's axis [m]; a joint may have its own.
         joints: Up to 100 joints, base to tip.
         links: One :class:`Link` after each joint, longer than the offsets of its disks.

@@ -32,9 +32,9 @@ class Joint:
             the previous link. Any length; no axis is zero, and two axes are not parallel.
         disk_offset: h: distance from the joint centre to the disk on each side [m].
         limit: Largest angle about each axis in both directions [rad]; None: where disks of radius r
-            touch, with r = ``disk_radius``, or else R. They touch at the bend γ = 2 atan(h/r), or
+            touch, with r = ``disk_radius``, or else R. They touch at `γ = 2 atan(h/r)`, or at
             80° if that is less; a universal joint bends so far if both axes turn by
-            arccos √cos γ, which is its limit.
+            `arccos √(cos γ)`, which is its limit.
         hole_radius: R: distance of the holes of its two disks from the arm's axis [m]; None: the
             ``hole_radius`` of the :class:`Geometry`.
         disk_radius: Outer radius of the two disks [m]; None: 1.1 times the distance of the farthest
@@ -50,7 +50,7 @@ class Joint:
         follows: Number of a joint before it, from 1, whose angles it copies; None: it is free.
         rolls: Radii [m] of two round surfaces, before and after the joint, that roll on each other
             without slip about its one axis; None: the joint is a pin. The angle of the joint is
-            then that of the line of centres: the links turn by 1 + r₁/r₂ times as much, and
+            then that of the line of centres: the links turn by `1 + r₁/r₂` times as much, and
             limits, springs and stiffnesses count for this angle. The ``disk_offset`` counts from
             the contact.
 
@@ -194,7 +194,7 @@ class Disk(NamedTuple):
         return route.radius or self.hole_radius
 
     def hole(self, route: CableRoute) -> tuple[float, float, float]:
-        """Return the position (x, R cos φ, R sin φ) [m] of a cable's hole, in the link's frame."""
+        """Return the place `(x, R cos φ, R sin φ)` [m] of a cable's hole, in the link's frame."""
         R = self.radius_of(route)
         return self.x, R * math.cos(route.angle), R * math.sin(route.angle)
 

@@ -43,8 +43,8 @@ _OF_JOINTS = (
 class Universal(Beam):
     """Build an arm of n universal joints with m cables each.
 
-    Cable j = 0…m−1 of joint k = 1…n has its holes at φ = 2π((k−1) + n j)/(n m) + phase_k, or at
-    φ = hole_angles[k][j] + phase_k. If ``hole_angles`` and ``phase`` are not given, all holes of
+    Cable j = 0…m−1 of joint k = 1…n has its holes at `φ = 2π((k−1) + n j)/(n m) + phase_k`, or at
+    ``hole_angles[k][j] + phase[k]``. If ``hole_angles`` and ``phase`` are not given, all holes of
     the base disk are evenly spaced. A size is one number for all joints, or a list with one for
     each joint, base to tip. Errors and warnings are those of :class:`Geometry`.
 
@@ -52,7 +52,7 @@ class Universal(Beam):
         joints: n, 1 to 100.
         cables_per_joint: m; not needed with ``hole_angles``.
         link_length: Length of every link [m], more than two ``disk_offset``.
-        base_length: L_0: distance from the base frame to joint 1 [m].
+        base_length: `L_0`: distance from the base frame to joint 1 [m].
         disk_offset: h: distance from each joint centre to the disk on each side [m].
         hole_radius: R: distance of the holes from the axis, on both disks of a joint [m].
         link_mass: Mass of every link [kg].
@@ -69,7 +69,7 @@ class Universal(Beam):
         coupled: Whether all joints turn by the angles of the first one, as in a section that bends
             evenly.
         spread: Angle [rad] between the holes of g cables whose angles φ are equal: the hole of
-            cable i = 0…g−1, base to tip, is turned by (i − (g−1)/2)·spread. 0: not turned.
+            cable i = 0…g−1, base to tip, is turned by `(i − (g−1)/2)·spread`. 0: not turned.
         bending_stiffness: EI of all links [N m²]; None: they do not bend. Or give the diameters.
         torsion_stiffness: GJ of all links [N m²]; None: EI/(1 + ν); inf: they do not twist.
         outer_diameter: Outer diameter [m] of links that are tubes or rods.
@@ -156,10 +156,10 @@ class Universal(Beam):
 class Hinged(Universal):
     """Build an arm of n hinges; ``twist`` [rad] turns each axis about x from the previous one.
 
-    Hinge k has the axis cos ψ_k y + sin ψ_k z with ψ_k = (k−1)·twist. The link frames are not
-    twisted. Cable j = 0…m−1 of hinge k has its holes at φ = ψ_k + 90° + 2πj/m + phase_k: by default
-    (m = 2) an antagonistic pair at ψ_k ± 90°. Cables of parallel hinges share holes; ``spread``
-    separates them. All other arguments are those of :meth:`Geometry.universal`.
+    Hinge k has the axis `cos ψ_k y + sin ψ_k z` with `ψ_k = (k−1)·twist`. The link frames are not
+    twisted. Cable j = 0…m−1 of hinge k has its holes at `φ = ψ_k + 90° + 2πj/m + phase_k`: by
+    default (m = 2) an antagonistic pair at `ψ_k ± 90°`. Cables of parallel hinges share holes;
+    ``spread`` separates them. All other arguments are those of :meth:`Geometry.universal`.
     """
 
     twist: Turn
@@ -174,22 +174,22 @@ class Hinged(Universal):
 class Rolling(Hinged):
     """Build an arm of n links whose round ends roll on each other, without slip.
 
-    The surfaces of joint k have the radii r₁ = ``radius``, on the link before it, and r₂ =
-    ``second_radius``. Equal arcs turn the line of their centres by q on the first, and by q r₁/r₂
+    The surfaces of joint k have the radii `r₁`, ``radius``, on the link before it, and `r₂`,
+    ``second_radius``. Equal arcs turn the line of their centres by q on the first, and by `q r₁/r₂`
     on the second: a hinge ``joint{k}`` at the centre of the first surface, a link of length
-    r₁ + r₂, and a hinge ``joint{k}_roll`` at the centre of the second, which copies the first one
-    with the multiplier r₁/r₂. **The angle q is that of the line of centres; the links turn by
-    θ = q (1 + r₁/r₂) to each other**, 2 q for equal radii. Limits and springs count for q, and so
-    does K_θ: the stiffness for θ is K_θ/(1 + r₁/r₂)².
+    `r₁ + r₂`, and a hinge ``joint{k}_roll`` at the centre of the second, which copies the first one
+    with the multiplier `r₁/r₂`. **The angle q is that of the line of centres.** The links turn by
+    `θ = q (1 + r₁/r₂)` to each other, 2 q for equal radii. Limits and springs count for q, and so
+    does `K_θ`: the stiffness for θ is `K_θ/(1 + r₁/r₂)²`.
 
     At q = 0 the contact of joint 1 is at x = ``base_length``, and each ``link_length`` goes from
     contact to contact. ``disk_offset`` h counts from the contact. A hole on the rim of the surface,
-    at the angle α from the line of centres, has h = r (1 − cos α) and ``hole_radius`` r sin α. The
-    sum of the lengths of an antagonistic pair then grows as the joint bends (variable neutral
+    at the angle α from the line of centres, has `h = r (1 − cos α)` and ``hole_radius`` `r sin α`.
+    The sum of the lengths of an antagonistic pair then grows as the joint bends (variable neutral
     line), so tension straightens the arm.
 
-    Slip, and contacts that open, are not modelled. Hinge k turns about cos ψ_k y + sin ψ_k z, with
-    ψ_k = (k−1)·twist; ``twist`` is 90° by default. All other arguments are those of
+    Slip, and contacts that open, are not modelled. Hinge k turns about `cos ψ_k y + sin ψ_k z`,
+    with `ψ_k = (k−1)·twist`; ``twist`` is 90° by default. All other arguments are those of
     :meth:`Geometry.hinged`.
     """
 

@@ -35,9 +35,9 @@ def identify(
     tension_of: TensionOf | None = None,
     progress: bool = True,
 ) -> Identification:
-    """Identify P parameters p of an arm within bounds: min Σ ((K_i(p) − K_i)/σ_i)².
+    """Identify P parameters p of an arm within bounds: `min Σ ((K_i(p) − K_i)/σ_i)²`.
 
-    With ``arm = model_of(**p)``, the prediction K_i(p) is ``stiffness(arm.at(angles), tension,
+    With ``arm = model_of(**p)``, the prediction `K_i(p)` is ``stiffness(arm.at(angles), tension,
     wrench).along(direction)``. For a measurement with a ``force`` it is ``weight_test(
     arm.at(angles), tension, force, wrench=wrench).stiffness``. The search shortens a step that
     leads to an unstable arm, to one that buckles under the force, or to a tension outside the

@@ -56,8 +56,8 @@ class Identification(Result, Plotted):
         measurements: The measurements.
         predicted: Predicted numbers (n,): stiffnesses [N/m], readings of loops [m] with fitted
             offsets, and coordinates of the tip [m].
-        residuals: r = (predicted − measured)/σ (n,) [-].
-        jacobian: J = ∂r/∂p (n, P).
+        residuals: `r = (predicted − measured)/σ` (n,) [-].
+        jacobian: `J = ∂r/∂p` (n, P).
         arm: Arm with these values.
         unfinished: Why the search ended before the optimum; empty if it did not.
         problem: The least squares that were solved.
@@ -101,7 +101,7 @@ class Identification(Result, Plotted):
 
     @property
     def covariance(self) -> Array:
-        """Covariance (JᵀJ)⁻¹ (P, P) for the given σ, not scaled by χ².
+        """Covariance `(JᵀJ)⁻¹` (P, P) for the given σ, not scaled by χ².
 
         If only the ratios of the σ are known, multiply it by :attr:`reduced_chi_square`. The bounds
         have no influence. An undetermined parameter has infinite variance.
@@ -115,7 +115,7 @@ class Identification(Result, Plotted):
 
     @quantity("1")
     def chi_square(self) -> float:
-        """χ² = Σ r² [-]. It is about :attr:`freedom` if the model and all σ are right."""
+        """`χ² = Σ r²` [-]. It is about :attr:`freedom` if the model and all σ are right."""
         return float(self.residuals @ self.residuals)
 
     @quantity("1")
@@ -187,7 +187,7 @@ class Identification(Result, Plotted):
     def ridge(self, i: int, j: int) -> str:
         """Describe along which values of two parameters χ² hardly rises, in a sentence.
 
-        Where p_i is off by its σ_i, the best p_j is off by r σ_j, and χ² is larger by 1.
+        Where `p_i` is off by its `σ_i`, the best `p_j` is off by `r σ_j`, and χ² is larger by 1.
         """
         r = self.correlation[i, j]
         a, b = (self.names[k] for k in (i, j))
@@ -206,16 +206,16 @@ class Identification(Result, Plotted):
 
         It contains the true value with the probability ``level``, between 0 and 1.
 
-        The interval of p_i follows from profile likelihood: fix p_i, fit the other parameters
-        within their bounds; the interval has all p_i where χ² rises by Δχ² ≤ q². q is the quantile
-        of a normal variable. For a linear model the interval is value ± q·std. For other models it
-        may be asymmetric. A limit is -inf or inf if Δχ² stays below q² up to the bound of the
-        parameter, or as far as the model exists: then the measurements set no limit.
+        The interval of `p_i` follows from profile likelihood: fix `p_i`, fit the other parameters
+        within their bounds; the interval has all `p_i` where χ² rises by `Δχ² ≤ q²`. q is the
+        quantile of a normal variable. For a linear model the interval is value ± q·std. For other
+        models it may be asymmetric. A limit is -inf or inf if Δχ² stays below `q²` up to the bound
+        of the parameter, or as far as the model exists: then the measurements set no limit.
 
         This predicts all measurements some 30 P² times; ``progress`` shows a bar on the standard
         error, if that is a terminal. If the σ are known only up to a common factor, widen them by
-        √(:attr:`reduced_chi_square`) and identify again. Another minimum of χ² that fits as well
-        stays unknown: try other starts of :func:`identify`.
+        the square root of :attr:`reduced_chi_square` and identify again. Another minimum of χ² that
+        fits as well stays unknown: try other starts of :func:`identify`.
 
         Raises:
             InvalidInput: ``level`` is not between 0 and 1; or χ² is lower elsewhere, where the

@@ -94,18 +94,18 @@ def to_mjcf(
     by how much per turn; motors that yield are refused.
 
     - ``length``: one motor per cable keeps its original length, as in :func:`~cdsm.equilibrium`.
-      Its force is k (u + L_rest − L), never a push. Its ``ctrl`` u is the length of wire that it
+      Its force is `k (u + L_rest − L)`, never a push. Its ``ctrl`` u is the length of wire that it
       pays out [m]. The motor of a force-controlled cable keeps F + u, with u in N.
     - ``tension``: one motor per cable pulls with the tension ``ctrl`` [N]: F in the keyframe, zero
       in a new ``mjData``. Most arms are then unstable and need a controller.
-    - ``none``: each cable is a spring of stiffness k and rest length L_rest. Force-controlled
+    - ``none``: each cable is a spring of stiffness k and rest length `L_rest`. Force-controlled
       cables, and springs softer than F/L, are motors without ``ctrl``.
 
     The time step is 1, 2 or 5 times a power of ten [s], at most 0.2/ω and MuJoCo's 2 ms, with the
     highest natural frequency ω [rad/s] of the arm. Bodies without mass get 1e-6 kg and 1e-9 kg m².
-    Each cable has the damping c = β k [N s/m], with β such that the least damped mode that gets
-    half of its ω² or more from the cables has the ``damping_ratio``. A comment at the top states
-    all this. If K_θ is not positive definite, it says UNSTABLE, and a warning is issued.
+    Each cable has the damping `c = β k` [N s/m], with β such that the least damped mode that gets
+    half of its `ω²` or more from the cables has the ``damping_ratio``. A comment at the top states
+    all this. If `K_θ` is not positive definite, it says UNSTABLE, and a warning is issued.
 
     Args:
         arm: The arm.

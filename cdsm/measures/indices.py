@@ -16,7 +16,7 @@ _CLOSED = 1e-9  # smaller ratios are rounding of the linear program
 
 
 def tension_factor(pose: Posture) -> float:
-    """Compute the tension factor [-]: the largest min(F)/max(F) of F ≥ 0 with J_Lᵀ F = 0.
+    """Compute the tension factor [-]: the largest min(F)/max(F) of F ≥ 0 with `J_Lᵀ F = 0`.
 
     It is 1 if equal tensions cause no joint torque. Above 0 the arm has wrench closure: unlimited
     tensions can balance every joint torque (Gouttefarde and Gosselin, IEEE T-RO 22, 2006). Pham,
@@ -50,9 +50,9 @@ def tension_factor(pose: Posture) -> float:
 def isotropy(stiffness: Stiffness) -> float:
     """Compute the ratio of the least to the largest tip stiffness of all directions, 0 to 1 [-].
 
-    The stiffness along u is 1/(uᵀ C_vv u), Eq. 20. The ratio is 0 if the stiffness is infinite in
+    The stiffness along u is `1/(uᵀ C_vv u)`, Eq. 20. The ratio is 0 if the stiffness is infinite in
     some directions, and 1 if it is infinite in all. Raises InvalidInput if the arm is unstable, and
-    SingularStiffness if K_θ is singular.
+    SingularStiffness if `K_θ` is singular.
 
     Example:
         >>> import cdsm

@@ -146,13 +146,13 @@ def payload(
     with motors that follow and with locked ones; in kg too where u is the direction of gravity.
     Two limits are numbers of their own. Tension: the motors re-distribute the tensions,
 
-        max f  subject to  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum.
+        `max f`  subject to  `J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g`,  `minimum ≤ F ≤ maximum`.
 
-    Deflection: the motors are locked at the least tensions without the force, and f |C_vv u| is at
-    most ``deflection``, with their compliance C_vv.
+    Deflection: the motors are locked at the least tensions without the force, and `f |C_vv u|` is
+    at most ``deflection``, with their compliance `C_vv`.
 
     The worst direction has the smallest f. It is the normal of the nearest facet of the
-    :func:`force_polytope`, or the softest direction of C_vv.
+    :func:`force_polytope`, or the softest direction of `C_vv`.
 
     Args:
         pose: The posture, which stays fixed.
@@ -175,7 +175,7 @@ def payload(
         InfeasibleTension: The worst direction is wanted, and no tensions balance the arm without
             the force. With a direction, the limits are 0 and :attr:`Payload.problem` says why.
         ElasticityRangeError: A tension without the force is outside the domain of its law.
-        SingularStiffness: K_θ without the force is singular.
+        SingularStiffness: `K_θ` without the force is singular.
         CdsmError: A linear program fails.
 
     Example:

@@ -45,10 +45,11 @@ class Claim:
         quantity: Name of the compared quantity.
         unit: Unit of all numbers.
         paper: Numbers of the paper; None if the paper gives words only.
-        computed: K_R with the pseudo-inverse and l_0 = L, as in the paper; for Section V the
+        computed: `K_R` with the pseudo-inverse and `l_0 = L`, as in the paper; for Section V the
             stiffness measured by weights; for Fig. 5 numbers of the strand.
-        original: As ``computed``, but with the original length l_0. Empty for Fig. 5 and Section V.
-        along: Stiffness that a small weight measures, with the original length l_0. Empty for
+        original: As ``computed``, but with the original length `l_0`. Empty for Fig. 5 and Section
+            V.
+        along: Stiffness that a small weight measures, with the original length `l_0`. Empty for
             Fig. 5 and Section V.
         assumption: Assumptions where the paper is silent.
         searched: Assumptions that were searched to meet the paper's number; empty if none.

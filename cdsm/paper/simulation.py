@@ -56,12 +56,12 @@ class Curve(Result):
 
     Attributes:
         label: Name of the curve in its figure.
-        original_length: ``"stretched"`` for EA/L, ``"unstrained"`` for EA/l_0.
+        original_length: ``"stretched"`` for EA/L, ``"unstrained"`` for `EA/l_0`.
         q: Joint angles (nv,) [rad].
         swept: Swept quantity (N,): Young's modulus [Pa] or lower bound of tension [N].
         tension: Smallest, mean and largest cable tension (N, 3) [N].
-        pseudoinverse: Diagonal of the paper's K_R (N, 3) [N/m].
-        pseudoinverse_part: The same of the ``part`` of K_θ that the figure names (N, 3) [N/m].
+        pseudoinverse: Diagonal of the paper's `K_R` (N, 3) [N/m].
+        pseudoinverse_part: The same of the ``part`` of `K_θ` that the figure names (N, 3) [N/m].
         along: Stiffness that a small weight measures along x, y, z (N, 3) [N/m].
         along_part: Contribution of this part to ``along`` (N, 3) [N/m].
     """
@@ -84,9 +84,9 @@ class StiffnessFigure(Figure):
 
     Attributes:
         swept: ``"young_modulus"`` or ``"tension"``: the quantity on the horizontal axis.
-        part: ``"active"`` or ``"passive"``: the term of K_θ that is shown beside the total.
+        part: ``"active"`` or ``"passive"``: the term of `K_θ` that is shown beside the total.
         curves: Curves with the cable stiffness EA/L, L the stretched length, as in the paper.
-        original: The same curves with EA/l_0, l_0 the original length.
+        original: The same curves with `EA/l_0`, `l_0` the original length.
         postures: Posture of each curve.
     """
 
@@ -102,12 +102,12 @@ class StiffnessFigure(Figure):
 class LeadFigure(Figure):
     """Change of stiffness if the lower bound of tension rises from 100 N to 800 N, for each lead.
 
-    Changes (N, 2, 3) are those of K_R and of what a small weight measures, in x, y and z.
+    Changes (N, 2, 3) are those of `K_R` and of what a small weight measures, in x, y and z.
 
     Attributes:
         leads: Straight cable between its actuator and the base disk, for all cables (N,) [m].
-        stretched: Changes (N, 2, 3) [%] with the stretched length, l_0 = L, as in the paper.
-        original: Changes (N, 2, 3) [%] with the original length l_0.
+        stretched: Changes (N, 2, 3) [%] with the stretched length, `l_0 = L`, as in the paper.
+        original: Changes (N, 2, 3) [%] with the original length `l_0`.
     """
 
     leads: Array = field(metadata=unit("m", "lead"))

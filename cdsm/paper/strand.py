@@ -43,7 +43,7 @@ class StrandFigure(Figure):
 
     Attributes:
         tension: F (N,) [N].
-        displacement: Elongation of a wire of 0.5 m from 2.2 N on, ∫ l_0 dF/EA (N,) [m].
+        displacement: Elongation of a wire of 0.5 m from 2.2 N on, `∫ l_0 dF/EA` (N,) [m].
         tangent: Tangent rigidity EA of the repaired Eq. 19 (N,) [N].
         secant: Secant rigidity (Eq. 18) of the repaired Eq. 19 (N,) [N].
         printed: EA by Eq. 19 as printed (N,) [N].
@@ -78,11 +78,11 @@ def left_open(tension: float) -> tuple[float, float]:
 
 
 def law_of_stretched_length(law: Elasticity) -> Elasticity:
-    """Return the law with which EA/l_0 is EA/L of ``law``: the stiffness of a wire in the paper.
+    """Return the law with which `EA/l_0` is EA/L of ``law``: the stiffness of a wire in the paper.
 
-    The paper takes the stretched length L of a wire for its original length l_0. With the strain
-    ε = ∫ dF/EA of ``law`` this is exactly a wire of another law, EA′ = EA exp(−ε): its strain is
-    ε′ = exp(ε) − 1, so that EA′/l_0 = EA′ (1 + ε′)/L = EA/L. It ends where ``law``
+    The paper takes the stretched length L of a wire for its original length `l_0`. With the strain
+    `ε = ∫ dF/EA` of ``law`` this is exactly a wire of another law, `EA′ = EA exp(−ε)`: its strain
+    is `ε′ = exp(ε) − 1`, so that `EA′/l_0 = EA′ (1 + ε′)/L = EA/L`. It ends where ``law``
     does, at 10 kN at most.
     """
     joins = law.arguments.get("joins", ())

@@ -46,7 +46,7 @@ def plan_path(
     guess: ArrayLike | None = None,
     max_change_per_sample: ArrayLike = math.inf,
 ) -> PathPlan:
-    """Plan tensions for a wanted stiffness along a path: min ‖F_i‖² with along(u) = target_i.
+    """Plan tensions for a wanted stiffness along a path: `min ‖F_i‖²` with `along(u) = target_i`.
 
     Each of S samples is planned as by :func:`~cdsm.plan_stiffness`, from the tensions of the sample
     before, or from scratch if that fails. An infeasible sample does not stop the path:

@@ -55,7 +55,7 @@ class PathPlan(Result, Plotted):
         angles: Joint angles (P, nv) [rad]; [m] for prismatic joints.
         tensions: F (P, C) [N].
         achieved: ``stiffness.along``, (P,) or (P, n) [N/m].
-        stiffness: K_θ at each planned sample, with its posture and wrench.
+        stiffness: `K_θ` at each planned sample, with its posture and wrench.
         infeasible: The samples that are not planned, each with its reason.
     """
 
@@ -93,9 +93,9 @@ class PathPlan(Result, Plotted):
 
     @quantity("m", "planned", "held_cable")
     def rest_lengths(self) -> Array:
-        """Lengths without strain l_0 (P, H) [m] of the H position-controlled cables: paid-out wire.
+        """Lengths without strain `l_0` (P, H) [m] of the H position-controlled cables, paid out.
 
-        l_0 + Δl(F, l_0) = L, with :meth:`~cdsm.Cable.elongation` Δl.
+        `l_0 + Δl(F, l_0) = L`, with :meth:`~cdsm.Cable.elongation` Δl.
         """
         rows = np.array([K.free_lengths for K in self.stiffness])
         return frozen(rows.reshape(self.tensions.shape)[:, self.arm.cables.position_controlled])

@@ -42,7 +42,7 @@ class StiffnessPlan(Result):
 
     Attributes:
         tension: The planned tensions.
-        stiffness: K_θ under these tensions.
+        stiffness: `K_θ` under these tensions.
         direction: Unit directions u in base axes, (3,) or (n, 3).
         target: The target [N/m]: a number, or one per direction (n,).
         achieved: ``stiffness.along`` () or (n,) [N/m].
@@ -66,7 +66,7 @@ class StiffnessPlan(Result):
 
     @quantity("1")
     def misfit(self) -> float:
-        """‖achieved/target − 1‖ [-]; with ``at_least``, of what is missing."""
+        """`‖achieved/target − 1‖` [-]; with ``at_least``, of what is missing."""
         missed = np.divide(self.achieved, self.target) - 1.0
         return float(np.linalg.norm(np.minimum(missed, 0.0) if self.at_least else missed))
 
@@ -87,9 +87,9 @@ class StiffnessPlan(Result):
 
     @quantity("m", "cable")
     def rest_lengths(self) -> Array:
-        """Lengths without strain l_0 (C,) [m] that the motors pay out; L if force-controlled.
+        """Lengths without strain `l_0` (C,) [m] that the motors pay out; L if force-controlled.
 
-        l_0 + Δl(F, l_0) = L, with :meth:`~cdsm.Cable.elongation` Δl.
+        `l_0 + Δl(F, l_0) = L`, with :meth:`~cdsm.Cable.elongation` Δl.
         """
         return self.stiffness.free_lengths
 
@@ -126,18 +126,18 @@ def plan_stiffness(
     *,
     at_least: bool = False,
 ) -> StiffnessPlan:
-    """Plan least tensions for a wanted stiffness: min ‖F‖², along(u) = target (Eqs. 13, 17, 20).
+    """Plan least tensions for a stiffness: `min ‖F‖²` with `along(u) = target` (Eqs. 13, 17, 20).
 
-    The constraints on F are J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of
-    position-controlled cables, and stability: the smallest eigenvalue of K_θ (symmetric part) is at
-    least 1 % of what it is under the least tensions, or, if they hardly hold the arm, under the
+    The constraints on F are `J_Lᵀ F = J_Xᵀ W − g`, the bounds, the domains of the elasticities of
+    position-controlled cables, and stability: the smallest eigenvalue of `K_θ` (symmetric part) is
+    at least 1 % of what it is under the least tensions, or, if they hardly hold the arm, under the
     most stable ones. The target of one direction is hit within 1e-6 of its value; otherwise an
     error is raised. The targets of several directions are hit if possible. If not, the tensions
     have the least sum of squared relative misses that was found, and ``reached`` is False.
 
-    With ``at_least``, along(u) ≥ target. If EA is constant or levels off, ``along`` is concave in
+    With ``at_least``, `along(u) ≥ target`. If EA is constant or levels off, ``along`` is concave in
     F, and this problem has one optimum. The equation is not convex: its searches are local. In
-    326 of 327 random plans, their effort ‖F‖ was at most 0.2 % above that of an independent
+    326 of 327 random plans, their effort `‖F‖` was at most 0.2 % above that of an independent
     program, in one by 3 %.
 
     Args:

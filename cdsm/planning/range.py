@@ -49,7 +49,7 @@ class StiffnessRange(Result, Plotted):
         high: Largest attainable ``along(u)`` [N/m] that the searches found.
         low_tension: Tensions that give ``low``.
         high_tension: Tensions that give ``high``.
-        floor: Smallest eigenvalue of K_θ at which an arm still counts as stable [N m/rad].
+        floor: Smallest eigenvalue of `K_θ` at which an arm still counts as stable [N m/rad].
     """
 
     _headline = "ends"
@@ -122,7 +122,7 @@ def stiffness_range(
     corners of the set of admissible tensions. So the search for ``low`` begins at many corners, and
     from the softest one found at all beside it, until none is softer; this does not prove that
     ``low`` is the smallest. If tension can buckle the arm, it is softest just before: ``low`` then
-    depends on ``floor``, 1 % of the smallest eigenvalue of K_θ under the least tensions (or, if
+    depends on ``floor``, 1 % of the smallest eigenvalue of `K_θ` under the least tensions (or, if
     they hardly hold the arm, under the most stable ones), and ``print`` says "limited by
     stability".
 

@@ -40,7 +40,7 @@ class StiffnessGradient(Result):
 
     Each has the name of the attribute or method of :class:`~cdsm.Stiffness` that it differentiates.
     Posture and wrench are fixed. A change of one tension alone breaks the balance (Eq. 13), so
-    multiply the derivatives by changes ΔF that keep it: J_Lᵀ ΔF = 0.
+    multiply the derivatives by changes ΔF that keep it: `J_Lᵀ ΔF = 0`.
 
     Attributes:
         stiffness: K; the derivatives are taken at its tensions.
@@ -56,7 +56,7 @@ class StiffnessGradient(Result):
 
     @cached_property
     def joint(self) -> Array:
-        """∂K_θ/∂F (C, nv, nv) [m/rad²]: one symmetric matrix per cable."""
+        """`∂K_θ/∂F` (C, nv, nv) [m/rad²]: one symmetric matrix per cable."""
         J = self._driven
         slope = self.cable_stiffness[:, None, None]
         return frozen(self.stiffness.posture.length_hessian + slope * J[:, :, None] * J[:, None])
@@ -69,11 +69,11 @@ class StiffnessGradient(Result):
 
     @cached_property
     def margin(self) -> Array:
-        """∂λ_min/∂F = vᵀ ∂K_θ/∂F v (C,) [m/rad²], with the unit eigenvector v of λ_min.
+        """`∂λ_min/∂F = vᵀ ∂K_θ/∂F v` (C,) [m/rad²], with the unit eigenvector v of `λ_min`.
 
-        λ_min is the smallest eigenvalue of the symmetric part of K_θ. A multiple eigenvalue has no
-        gradient. The result then belongs to one of its eigenvectors; the product with ΔF is an
-        upper bound of the change of λ_min, to first order.
+        `λ_min` is the smallest eigenvalue of the symmetric part of `K_θ`. A multiple eigenvalue has
+        no gradient. The result then belongs to one of its eigenvectors; the product with ΔF is an
+        upper bound of the change of `λ_min`, to first order.
         """
         v = self.stiffness.critical_direction[:, None]
         form = form_by_tension(
@@ -83,9 +83,9 @@ class StiffnessGradient(Result):
 
     @cached_property
     def cartesian(self) -> Array:
-        """∂(C_vv)⁻¹/∂F (C, 3, 3) [1/m], with the translational block C_vv of the compliance.
+        """`∂(C_vv)⁻¹/∂F` (C, 3, 3) [1/m], with the translational block `C_vv` of the compliance.
 
-        Raises SingularStiffness if K_θ is singular, or the tip hardly moves in some direction.
+        Raises SingularStiffness if `K_θ` is singular, or the tip hardly moves in some direction.
         """
         slope = self.cable_stiffness
         return frozen(
@@ -95,12 +95,12 @@ class StiffnessGradient(Result):
         )
 
     def along(self, direction: Direction) -> Array:
-        """Return ∂s/∂F (C,) [1/m] of the stiffness s = ``K.along(u)``, u being ``direction``.
+        """Return `∂s/∂F` (C,) [1/m] of the stiffness s = ``K.along(u)``, u being ``direction``.
 
-        ∂s/∂F = s² (K_θ⁻ᵀ J_vᵀ u)ᵀ ∂K_θ/∂F (K_θ⁻¹ J_vᵀ u), with the translational rows J_v of the
-        tip Jacobian. Of cables at 0 N, those that the force does not stretch are left out; the
+        `∂s/∂F = s² (K_θ⁻ᵀ J_vᵀ u)ᵀ ∂K_θ/∂F (K_θ⁻¹ J_vᵀ u)`, with the translational rows `J_v` of
+        the tip Jacobian. Of cables at 0 N, those that the force does not stretch are left out; the
         gradient then holds while they stay at 0 N. Raises InvalidInput if ``direction`` is not an
-        axis or a nonzero (3,), and SingularStiffness if K_θ is singular or the tip cannot move
+        axis or a nonzero (3,), and SingularStiffness if `K_θ` is singular or the tip cannot move
         along u.
         """
         u = unit_direction("direction", direction)
@@ -154,10 +154,10 @@ def _driven(K: Stiffness, loose: NDArray[np.bool_]) -> Array:
 def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
     """Compute the derivatives of a stiffness K with respect to the cable tensions.
 
-    ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ, with the gradient J_c and the Hessian H_c of the length of
-    cable c and k′_c = dk_c/dF_c. k′_c includes dEA/dF and the series spring. Where motors yield,
-    J_c is that of Pᵀ J_L, with K_eff = P K_L (:attr:`Stiffness.wire_stiffness`). For example,
-    ``stiffness_gradient(K).along(u)`` is the gradient of ``K.along(u)``.
+    `∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ`, with the gradient `J_c` and the Hessian `H_c` of the length
+    of cable c and `k′_c = dk_c/dF_c`. `k′_c` includes `dEA/dF` and the series spring. Where motors
+    yield, `J_c` is that of `Pᵀ J_L`, with `K_eff = P K_L` (:attr:`Stiffness.wire_stiffness`). For
+    example, ``stiffness_gradient(K).along(u)`` is the gradient of ``K.along(u)``.
 
     Raises:
         InvalidInput: ``stiffness`` is not a frictionless ``Stiffness``.
@@ -189,7 +189,7 @@ class Saturation(Result):
         stiffest: The lower bound [N] with the largest stiffness: an end of the curve, or one above
             which tension softens the arm.
         tension: The least tensions with the lower bound ``bound`` or, if that is inf, the last one.
-        stiffness: K_θ under these tensions.
+        stiffness: `K_θ` under these tensions.
         limit: What ends the curve: UNSTABLE (the arm buckles), INFEASIBLE or SOLVER_FAILED (no
             tensions balance it), OUTSIDE_ELASTICITY (a tension leaves the domain of its cable),
             AT_MAXIMUM (the upper bound of a tension), or OK (nothing).
@@ -254,8 +254,8 @@ def saturation(
     With F*(b), the least tensions with the lower bound b (Eq. 17), s(b) is the stiffness along u.
     The result is the least b at which s is ``fraction`` of its largest value, interpolated between
     200 bounds. A strand starts soft (Section IV-C). Where its rigidity has levelled off, more
-    tension has two small effects: the active part of K_θ (Eq. 16) usually softens the arm, and the
-    wires stiffen since their original lengths fall. Series springs and leads weaken the second.
+    tension has two small effects: the active part of `K_θ` (Eq. 16) usually softens the arm, and
+    the wires stiffen since their original lengths fall. Series springs and leads weaken the second.
 
     Args:
         pose: The posture, which stays fixed.

@@ -78,8 +78,9 @@ def plot_arm(
         pose: Posture to draw, or an equilibrium, which brings its tensions, compliance and load; if
             its tip moved by less than 0.3 of the arm's length, its reference is drawn pale below.
         tension: Tensions, or F (C,) [N], that colour the cables. Slack cables are dashed.
-        stiffness: Its compliance is drawn at the tip: the outline of the displacements C_vv f under
-            forces f of 1 N, or of a power of ten below that. Of an unstable arm the note says so.
+        stiffness: Its compliance is drawn at the tip: the outline of the displacements `C_vv f`
+            under forces f of 1 N, or of a power of ten below that. Of an unstable arm the note says
+            so.
         ax: Ordinary axes to draw on; None: a new figure of one column.
         view: Elevation and azimuth of the eye [deg].
         limits: Tensions [N] at the ends of the colours; None: the smallest and the largest.

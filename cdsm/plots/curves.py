@@ -91,7 +91,7 @@ def plot_stiffness_over_tension(
 
     It is in N/mm, of soft arms in N/m.
 
-    The terms of K_θ, such as the elasticity of the cables and their tension, are drawn too; they
+    The terms of `K_θ`, such as the elasticity of the cables and their tension, are drawn too; they
     add up to the stiffness. A range in which the arm is unstable is hatched. Marks tell from where
     on more tension adds little.
 
@@ -516,7 +516,7 @@ def _draw_events(panel: Axes, events: Sequence[_Mark], lowest: bool = False) -> 
 def plot_critical_tension(
     critical: CriticalTension, ax: Axes | None = None, *, title: str | None = None
 ) -> Axes:
-    """Plot the smallest eigenvalue of K_θ [N m/rad] over the lower bound of all tensions [N].
+    """Plot the smallest eigenvalue of `K_θ` [N m/rad] over the lower bound of all tensions [N].
 
     Unstable ranges are shaded.
     """
@@ -547,7 +547,7 @@ def plot_critical_tension(
 def plot_critical_load(
     critical: CriticalLoad, ax: Axes | None = None, *, title: str | None = None
 ) -> Axes:
-    """Plot the smallest eigenvalue of K_θ [N m/rad] over the factor of the load."""
+    """Plot the smallest eigenvalue of `K_θ` [N m/rad] over the factor of the load."""
     panel = _margins(critical, critical.factors, critical.margins, ax)
     question = "how much of the load does it hold? All"
     if math.isfinite(critical.factor):

@@ -113,7 +113,7 @@ def fit_spring(
     scale: float = SCALE,
     between: tuple[float, float] = (-np.inf, np.inf),
 ) -> SpringFit:
-    """Fit the law M = k x (1 + (x/a)²)^((p−1)/2) to torques M at angles x from rest.
+    """Fit the law `M = k x (1 + (x/a)²)^((p−1)/2)` to torques M at angles x from rest.
 
     Least squares of the torques give k and p; their standard deviations come from the scatter. The
     scale a is given, not found, and k at rest depends on it: ``stiffness_range`` has k with half

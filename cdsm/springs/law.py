@@ -31,16 +31,16 @@ _TURN = 2.0 * math.pi
 @final
 @dataclass(frozen=True, repr=False)
 class SpringLaw:
-    """Law of a spring at a joint: torque M [N m] over the angle x = q − q_0 [rad] from rest.
+    """Law of a spring at a joint: torque M [N m] over the angle `x = q − q_0` [rad] from rest.
 
-    M(0) = 0, and M rises everywhere: k = M′ > 0. :meth:`power`, :meth:`table` and :meth:`function`
-    make laws; ``joint_stiffness=`` and ``springs=`` take them where they take a number. At a
-    prismatic joint angles are ways [m], torques forces [N] and stiffnesses in N/m. Laws made of
-    equal values are equal, those of functions if the functions are the same objects.
+    M(0) = 0, and M rises everywhere: `k = M′ > 0`. :meth:`power`, :meth:`table` and
+    :meth:`function` make laws; ``joint_stiffness=`` and ``springs=`` take them where they take a
+    number. At a prismatic joint angles are ways [m], torques forces [N] and stiffnesses in N/m.
+    Laws made of equal values are equal, those of functions if the functions are the same objects.
 
     Attributes:
         shape: M(x), which the law is made of.
-        angle: Angle q_0 without torque [rad].
+        angle: Angle `q_0` without torque [rad].
 
     Example:
         >>> import cdsm
@@ -54,9 +54,9 @@ class SpringLaw:
 
     @staticmethod
     def power(*, stiffness: float, exponent: float, scale: float, angle: float = 0.0) -> SpringLaw:
-        """Return the law M = k x (1 + u)^((p−1)/2) with u = (x/a)².
+        """Return the law `M = k x (1 + u)^((p−1)/2)` with `u = (x/a)²`.
 
-        Near rest it is k x, beyond the scale a it grows as x^p: flexures of TPU have p of 0.5 to
+        Near rest it is k x, beyond the scale a it grows as `x^p`: flexures of TPU have p of 0.5 to
         0.8. A plain power with p < 1 would have an infinite tangent at rest. With p = 1 the spring
         is that of the number k, to the last digit.
 
@@ -64,7 +64,7 @@ class SpringLaw:
             stiffness: k [N m/rad], the tangent at rest.
             exponent: p > 0 [-].
             scale: a > 0 [rad], the angle beyond which the power rules.
-            angle: q_0 [rad].
+            angle: `q_0` [rad].
 
         Raises:
             InvalidInput: A number is not positive, or ``stiffness`` is outside 1e-9 to 1e12.
@@ -99,7 +99,7 @@ class SpringLaw:
         Args:
             angles: x (n,) [rad] from rest, ascending; two or more that are not 0.
             torques: M (n,) [N m], rising; 0 at rest.
-            angle: q_0 [rad].
+            angle: `q_0` [rad].
 
         Raises:
             InvalidInput: There are fewer than two points, angles do not ascend, torques do not rise
@@ -152,8 +152,8 @@ class SpringLaw:
         Args:
             torque: M(x) [N m], of an array of any shape; M(0) = 0.
             stiffness: M′(x) [N m/rad]; None: differences of the torque, of fourth order.
-            energy: ∫ M dx [J]; None: adaptive quadrature.
-            angle: q_0 [rad].
+            energy: `∫ M dx` [J]; None: adaptive quadrature.
+            angle: `q_0` [rad].
 
         Raises:
             InvalidInput: A function fails, does not return one finite number for each angle, or the
@@ -198,11 +198,11 @@ class SpringLaw:
         return self.shape.torque(self._from_rest(angle))
 
     def stiffness(self, angle: ArrayLike) -> Array:
-        """Compute the tangent k = dM/dq [N m/rad] at joint angles q [rad], any shape."""
+        """Compute the tangent `k = dM/dq` [N m/rad] at joint angles q [rad], any shape."""
         return self.shape.stiffness(self._from_rest(angle))
 
     def energy(self, angle: ArrayLike) -> Array:
-        """Compute ∫ M dq [J] from rest to joint angles q [rad], any shape."""
+        """Compute `∫ M dq` [J] from rest to joint angles q [rad], any shape."""
         return self.shape.energy(self._from_rest(angle))
 
     def scaled(self, factor: float) -> SpringLaw:
@@ -219,7 +219,7 @@ class SpringLaw:
         return SpringLaw.power(**values, angle=self.angle)
 
     def at_angle(self, angle: float) -> SpringLaw:
-        """Return the law with another angle q_0 [rad] without torque."""
+        """Return the law with another angle `q_0` [rad] without torque."""
         return replace(self, angle=scalar("angle", angle))
 
     def fault(self, low: float, high: float) -> str:

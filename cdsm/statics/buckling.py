@@ -81,12 +81,12 @@ class CriticalTension(_Critical):
         applied: What acts: W (6,) at the tip, or loads on links.
         minimum: Lower bound of tension [N] at which the arm buckles: the end of the first range in
             ``stable``; inf if that is the end of ``examined``, its low end if no range is stable.
-        stiffness: K_θ at ``minimum``; if the arm does not buckle, at the bound with the smallest of
-            ``margins``. ``mode`` and ``tension`` belong to it.
+        stiffness: `K_θ` at ``minimum``; if the arm does not buckle, at the bound with the smallest
+            of ``margins``. ``mode`` and ``tension`` belong to it.
         stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
         examined: Range [N] of the lower bound that was scanned.
         bounds: Lower bounds (n,) [N] that were evaluated.
-        margins: Smallest eigenvalue of K_θ at each of these bounds (n,) [N m/rad].
+        margins: Smallest eigenvalue of `K_θ` at each of these bounds (n,) [N m/rad].
     """
 
     _headline = "minimum"
@@ -125,9 +125,9 @@ class CriticalLoad(_Critical):
         multiplied: What is multiplied by the factor: a wrench (6,) at the tip, or loads on links.
         factor: Largest factor [-] up to which the arm is balanced and stable; inf: half a million.
         limit: What ends it: ``"buckling"``, ``"infeasible"``, ``"elasticity"`` or ``"none"``.
-        stiffness: K_θ at ``factor``, or at half a million. ``mode`` and ``tension`` belong to it.
+        stiffness: `K_θ` at ``factor``, or at half a million. ``mode`` and ``tension`` belong to it.
         factors: Factors (n,) [-] under which the arm is stable, up to ``factor``, or to ten.
-        margins: Smallest eigenvalue of K_θ at each of these factors (n,) [N m/rad].
+        margins: Smallest eigenvalue of `K_θ` at each of these factors (n,) [N m/rad].
     """
 
     _headline = "factor"
@@ -170,9 +170,9 @@ class CriticalLoad(_Critical):
 def critical_tension(
     pose: Posture, wrench: LoadsLike = NO_WRENCH, *, up_to: float = 1e6
 ) -> CriticalTension:
-    """Compute the lower bound F_min [N] of tension at which K_θ stops being positive definite.
+    """Compute the lower bound `F_min` [N] of tension at which `K_θ` stops being positive definite.
 
-    The symmetric part of K_θ under the least tensions is examined at 200 bounds, even on a log
+    The symmetric part of `K_θ` under the least tensions is examined at 200 bounds, even on a log
     scale, up to ``up_to``, or to where no tensions within their laws and maxima balance the arm. A
     :class:`CdsmWarning` says that a backbone with one piece from disk to disk reads too much.
 

@@ -65,14 +65,14 @@ class Equilibrium(Result, Loaded):
     Attributes:
         reference: The posture at which the motors were locked.
         reference_tension: F (C,) [N] at the reference.
-        stiffness: K_θ at the equilibrium, with the rest lengths of the *reference*: the derivative
-            by q of the torque J_Lᵀ F + g − J_Xᵀ W, without the stops. For a pure force it is the
-            exact Hessian of the potential. If no cable is slack, it equals
+        stiffness: `K_θ` at the equilibrium, with the rest lengths of the *reference*: the
+            derivative by q of the torque `J_Lᵀ F + g − J_Xᵀ W`, without the stops. For a pure force
+            it is the exact Hessian of the potential. If no cable is slack, it equals
             :func:`~cdsm.stiffness` of this posture and tension.
         stop_torque: Torque of the stops on the joints (nv,) [N m]: positive at a lower limit,
             negative at an upper limit, zero elsewhere.
-        motors: ``"locked"``: they hold the lengths, so the elasticity of the cables counts in K_θ;
-            ``"tension"``: they hold the tensions (:func:`~cdsm.forward_statics`).
+        motors: ``"locked"``: they hold the lengths, so the elasticity of the cables counts in
+            `K_θ`; ``"tension"``: they hold the tensions (:func:`~cdsm.forward_statics`).
         branch: Share of load and pull up to which the arm followed without a jump; 1: all of it.
         events: What happened on the way there, in the order of the loads: cables that go slack or
             pass their maximum, joints that reach their stops, a loss of stability. Empty if load
@@ -117,7 +117,7 @@ class Equilibrium(Result, Loaded):
 
     @quantity("torque", "joint")
     def residual(self) -> Array:
-        """Residual torque J_Lᵀ F + g − J_Xᵀ W − stop_torque (nv,) [N m]."""
+        """Residual torque `J_Lᵀ F + g − J_Xᵀ W` less :attr:`stop_torque` (nv,) [N m]."""
         return frozen(self.stiffness.residual - self.stop_torque)
 
     @property
@@ -155,7 +155,7 @@ class Equilibrium(Result, Loaded):
 
     @quantity("1")
     def stable(self) -> bool:
-        """Whether the symmetric part of K_θ is positive definite for the joints not held by stops.
+        """Whether the symmetric part of `K_θ` is positive definite for the joints off their stops.
 
         It is False for a neutral state, for example if all cables are slack. A joint that touches
         its stop without a torque counts as free, even if this stop blocks the unstable motion.
@@ -167,7 +167,7 @@ class Equilibrium(Result, Loaded):
     def neutral(self) -> bool:
         """Whether a joint motion meets hardly any resistance: 1 % or less of what its terms have.
 
-        These are the magnitudes of the terms of K_θ along the motion of its smallest
+        These are the magnitudes of the terms of `K_θ` along the motion of its smallest
         eigenvalue. A straight round rod beyond its buckling load rests in any direction around its
         axis; the small stiffness of a model of it is that of its joints, and holds nothing.
         """
@@ -281,11 +281,11 @@ class Equilibrium(Result, Loaded):
     def compliance(self) -> Array:
         """Compliance at the tip (6, 6): tip motion per wrench, with joints at stops fixed.
 
-        C = J_X K_θ⁻¹ J_Xᵀ, with the rows and columns of the joints that no stop pushes. Linear rows
-        and columns of C are first: C_vv [m/N], C_vω [rad/N], C_ωω [rad/(N m)].
+        `C = J_X K_θ⁻¹ J_Xᵀ`, with the rows and columns of the joints that no stop pushes. Linear
+        rows and columns of C are first: `C_vv` [m/N], `C_vω` [rad/N], `C_ωω` [rad/(N m)].
 
         Raises:
-            SingularStiffness: K_θ of these joints is singular.
+            SingularStiffness: `K_θ` of these joints is singular.
         """
         return self.compliance_of(None)
 
@@ -297,7 +297,7 @@ class Equilibrium(Result, Loaded):
     def report(self) -> Report:
         """Check the stiffness here, as :meth:`Stiffness.report` does.
 
-        Raises InvalidInput if a joint rests on its stop, which K_θ does not know, or if cables
+        Raises InvalidInput if a joint rests on its stop, which `K_θ` does not know, or if cables
         stick or slide.
         """
         if self.path is not None:
@@ -314,15 +314,15 @@ class Equilibrium(Result, Loaded):
     def along(
         self, direction: Direction, link: str | None = None, point: ArrayLike | None = None
     ) -> float:
-        """Compute the tip stiffness 1/(uᵀ C_vv u) [N/m] along u, with joints at stops fixed.
+        """Compute the tip stiffness `1/(uᵀ C_vv u)` [N/m] along u, with joints at stops fixed.
 
-        C_vv (3, 3) is the part of :attr:`compliance` that relates displacements to forces. u is an
-        axis such as ``"z"``, or (3,) in base axes, any length. The stiffness is inf if the tip
+        `C_vv` (3, 3) is the part of :attr:`compliance` that relates displacements to forces. u is
+        an axis such as ``"z"``, or (3,) in base axes, any length. The stiffness is inf if the tip
         cannot move along u. ``link`` and ``point`` are as in :meth:`Stiffness.along`.
 
         Raises:
             InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero.
-            SingularStiffness: K_θ of the joints that are not at stops is singular.
+            SingularStiffness: `K_θ` of the joints that are not at stops is singular.
         """
         u = unit_direction("direction", direction)
         J_v = None
@@ -417,8 +417,8 @@ def equilibrium(
 ) -> Equilibrium:
     """Compute the equilibrium of an arm under a dead wrench, its motors locked at a reference.
 
-    Solve r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13). The elongation of a cable is its elongation at
-    the reference plus its change of length. For a pure force the solution is a minimum of the
+    Solve `r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0` (Eq. 13). The elongation of a cable is its elongation
+    at the reference plus its change of length. For a pure force the solution is a minimum of the
     potential of cables, weight and load: the search leaves saddle points, so an arm that buckles
     comes to rest away from the posture that became unstable. Joint limits act as stops.
 

@@ -44,8 +44,8 @@ class Event:
             loses its tension; ``"stop"``: a joint reaches its limit; ``"maximum"``: a tension
             passes the largest one of its cable; ``"law"``: a tension leaves the domain of the law
             of its wire; ``"lift-off"`` and ``"contact"``: a cable leaves or touches a pulley, and
-            K_θ has a step; ``"groove"``: it leaves a groove beside its plane, and its length has a
-            step; ``"buckling"``: K_θ is no longer positive definite.
+            `K_θ` has a step; ``"groove"``: it leaves a groove beside its plane, and its length has
+            a step; ``"buckling"``: `K_θ` is no longer positive definite.
         place: Name of the cable, hole or joint; for buckling, of the joint that moves most; for a
             pulley, of its cable and its link.
         share: Share of the load (and pull) [-]; in a load cycle, of the step to a load.

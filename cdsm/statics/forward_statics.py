@@ -59,11 +59,11 @@ def forward_statics(
 ) -> Equilibrium:
     """Compute where an arm comes to rest, from what its motors do.
 
-    Solve J_Lᵀ F + g + k (q − q_0) = J_Xᵀ W for q, between the joint limits. Joints that no cable
+    Solve `J_Lᵀ F + g + k (q − q_0) = J_Xᵀ W` for q, between the joint limits. Joints that no cable
     holds need springs. Exactly one of ``tension``, ``rest_lengths`` and ``pull`` is given: (C,), or
     a dict by the names of cables, the others being loose; or ``motors``, what motors of several
     cables are told. With given tensions, cables add no
-    stiffness of their own (k_c = 0); motors that hold lengths are locked, and k_c counts.
+    stiffness of their own (`k_c = 0`); motors that hold lengths are locked, and `k_c` counts.
     :attr:`Equilibrium.motors` says which: the two stiffnesses of one posture can differ by a factor
     of ten.
 
@@ -75,22 +75,22 @@ def forward_statics(
     Args:
         arm: The arm.
         tension: F (C,) [N] that the motors hold.
-        rest_lengths: Unstrained lengths l_0 (C,) [m] of the wires that the motors have left.
+        rest_lengths: Unstrained lengths `l_0` (C,) [m] of the wires that the motors have left.
         pull: How much wire each motor reports to have taken in (C,) [m], from the lengths in which
-            the cables are just straight at the angles q_0 of the springs: these lengths become
+            the cables are just straight at the angles `q_0` of the springs: these lengths become
             shorter by ``gain`` · pull − ``slack`` of each :class:`~cdsm.Cable`. A cable is straight
             at zero strain, where a law that begins above 0 N has its lowest tension.
         motors: What motors are told, by their names in ``arm.motors``, others as at the assembly;
             or (M,): how far they turn [rad] from there; of one that holds its torque the torque
-            Bᵀ F [N m]; of a cable's own motor wire taken in [m], or its tension [N].
+            `Bᵀ F` [N m]; of a cable's own motor wire taken in [m], or its tension [N].
         assembly: Wires with the motors at 0, of :meth:`Manipulator.assemble`; with ``motors``.
             Pulls then grow from its posture. Default: the cables are just straight at the angles
-            q_0 of the springs, as for ``pull``.
+            `q_0` of the springs, as for ``pull``.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; or loads on any
             links, as for :func:`~cdsm.stiffness`.
         start: Angles q (nv,) [rad] at which the search begins, under the whole load. None: load and
-            pull grow from nothing, from the angles q_0; :attr:`Equilibrium.branch` says if the arm
-            jumped on the way. A start has no history: not with friction.
+            pull grow from nothing, from the angles `q_0`; :attr:`Equilibrium.branch` says if the
+            arm jumped on the way. A start has no history: not with friction.
         friction: Whether friction in the holes counts. False: where the arm rests without it.
 
     Raises:

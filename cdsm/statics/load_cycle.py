@@ -304,14 +304,15 @@ def load_cycle(
 ) -> LoadHistory:
     """Compute the states of an arm with friction under a series of slowly applied loads.
 
-    Under a load the arm is in equilibrium, r(q) = Σ T_j g_j + g − J_Xᵀ W = 0 (Eq. 13 by segments),
-    with the gravity torque g, the tension T_j of segment j and the gradient g_j of its length. At
-    hole j, which bends the cable by φ_j, |ln T_{j+1} − ln T_j| ≤ μ φ_j with the friction
-    coefficient μ. Wire moves through a hole only at this bound, towards the larger tension. So each
-    state depends on all earlier loads. The first state is the reference, with one tension in all
-    segments of a cable, as after shaking the arm; or a rest with friction, whose history goes on.
-    Between two loads the wrench and the commands change linearly and slowly, without inertia.
-    Joint limits are stops. Without friction each load gives the :func:`~cdsm.equilibrium`.
+    Under a load the arm is in equilibrium, `r(q) = Σ T_j g_j + g − J_Xᵀ W = 0` (Eq. 13 by
+    segments), with the gravity torque g, the tension `T_j` of segment j and the gradient `g_j` of
+    its length. At hole j, which bends the cable by `φ_j`, `|ln T_{j+1} − ln T_j| ≤ μ φ_j` with the
+    friction coefficient μ. Wire moves through a hole only at this bound, towards the larger
+    tension. So each state depends on all earlier loads. The first state is the reference, with one
+    tension in all segments of a cable, as after shaking the arm; or a rest with friction, whose
+    history goes on. Between two loads the wrench and the commands change linearly and slowly,
+    without inertia. Joint limits are stops. Without friction each load gives the
+    :func:`~cdsm.equilibrium`.
 
     In rare cases several postures are in equilibrium. Then the result is the one that the search
     from the previous posture finds.

@@ -30,15 +30,15 @@ class Modes(Result, Plotted):
     """Natural modes of an arm and the stiffness from which they follow; made by :func:`modes`.
 
     S of the nv modes vibrate. The other modes grow; a stable arm has none of them. Shapes are
-    columns of joint angles, mass-normalised and orthogonal in M and K_θ: φᵀMφ = 1 and φᵀK_θφ = ω².
-    A shape has the unit rad/(√kg m); its largest entry is positive.
+    columns of joint angles, mass-normalised and orthogonal in M and `K_θ`: `φᵀ M φ = 1` and
+    `φᵀ K_θ φ = ω²`. A shape has the unit [rad/(√kg m)]; its largest entry is positive.
 
     Attributes:
-        stiffness: K_θ with its posture, tensions and wrench.
+        stiffness: `K_θ` with its posture, tensions and wrench.
         mass: M (nv, nv) [kg m²].
         frequencies: ω/2π (S,) [Hz], ascending.
         shapes: φ of the modes that vibrate (nv, S) [rad/(√kg m)].
-        growth_rates: √(−ω²) of the modes that grow (n,) [1/s], the fastest first. A deflection
+        growth_rates: `√(−ω²)` of the modes that grow (n,) [1/s], the fastest first. A deflection
             grows by a factor e in the time 1/rate.
         growth_shapes: φ of the modes that grow (nv, n) [rad/(√kg m)].
     """
@@ -75,16 +75,16 @@ class Modes(Result, Plotted):
 
 
 def modes(stiffness: Stiffness) -> Modes:
-    """Compute natural frequencies and mode shapes at the posture of a stiffness: K_θ φ = ω² M φ.
+    """Compute natural frequencies and mode shapes at the posture of a stiffness: `K_θ φ = ω² M φ`.
 
-    The symmetric part of K_θ is used. A skew part, which a moment at the tip or sliding cables add,
-    is left out. The modes describe a small vibration about the posture, without losses by friction
-    or damping. They are valid only if the tensions balance the arm there, see
+    The symmetric part of `K_θ` is used. A skew part, which a moment at the tip or sliding cables
+    add, is left out. The modes describe a small vibration about the posture, without losses by
+    friction or damping. They are valid only if the tensions balance the arm there, see
     :attr:`Stiffness.residual <cdsm.Stiffness.residual>`. If the arm buckles, ``is_stable`` is
     false; this is not an error.
 
     Args:
-        stiffness: K_θ, the result of :func:`~cdsm.stiffness`; it has its posture.
+        stiffness: `K_θ`, the result of :func:`~cdsm.stiffness`; it has its posture.
 
     Raises:
         InvalidInput: ``stiffness`` is no Stiffness.

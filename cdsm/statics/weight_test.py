@@ -152,7 +152,7 @@ class WeightTest(Result, Plotted):
 
     @quantity("N/m")
     def stiffness(self) -> float:
-        """Secant |ΔF|/(u·ΔX) [N/m], u = ΔF/|ΔF| (1/C of Eq. 20); inf without motion along u."""
+        """Secant `|ΔF|/(u·ΔX)` [N/m], `u = ΔF/|ΔF|` (1/C of Eq. 20); inf without motion."""
         return self._secant(self.displacement)
 
     @quantity("N/m")
@@ -163,7 +163,7 @@ class WeightTest(Result, Plotted):
 
     @quantity("N/m")
     def tangent(self) -> float:
-        """Stiffness 1/(uᵀ C_vv u) [N/m] along the force, without the weight and without friction.
+        """Stiffness `1/(uᵀ C_vv u)` [N/m] along the force, without the weight and without friction.
 
         C is :attr:`Equilibrium.compliance` of ``unloaded``: joints at stops are fixed. Raises
         SingularStiffness if the arm without the weight is about to buckle.
@@ -172,7 +172,7 @@ class WeightTest(Result, Plotted):
 
     @quantity("m", "axis")
     def tangent_displacement(self) -> Array:
-        """Displacement C_vv ΔF (3,) [m] that the compliance without the weight predicts."""
+        """Displacement `C_vv ΔF` (3,) [m] that the compliance without the weight predicts."""
         J = None if self.point is None else jacobian_at(self.unloaded.pose, self.point)
         return frozen(self.unloaded.compliance_of(J)[:3, :3] @ self.force)
 

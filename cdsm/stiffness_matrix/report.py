@@ -66,8 +66,9 @@ _QUANTITIES: Final = {"wire": "EA of wires", "spring": "k_series", "tension": "l
 class Remedy:
     """Change of one quantity of an unstable arm; of :attr:`Report.remedies`.
 
-    ``change`` is ``"wire"``: EA of all wires; ``"spring"``: all k_series; ``"tension"``: the lower
-    bounds. ``factor`` [-] is the one nearest to 1 at which the arm becomes stable, None if none is.
+    ``change`` is ``"wire"``: EA of all wires; ``"spring"``: all `k_series`; ``"tension"``: the
+    lower bounds. ``factor`` [-] is the one nearest to 1 at which the arm becomes stable, None if
+    none is.
     """
 
     change: Literal["wire", "spring", "tension"]
@@ -89,16 +90,16 @@ class Report(Result):
 
     Attributes:
         stiffness: The stiffness that was checked.
-        comparisons: Terms of K_θ and torques against finite differences and the batch.
-        largest_residual: Largest residual |J_Lᵀ F + g − J_Xᵀ W| of Eq. 13 [N m]; the force at a
+        comparisons: Terms of `K_θ` and torques against finite differences and the batch.
+        largest_residual: Largest residual `|J_Lᵀ F + g − J_Xᵀ W|` of Eq. 13 [N m]; the force at a
             prismatic joint is multiplied by the arm's length.
         residual_joint: Name of the joint with the largest residual.
         imbalance: ``largest_residual`` per torque of cables, weight and load [-].
         bound_violation: Violation of the bounds of distributed tensions per largest tension [-];
             None for tensions that were given.
-        kkt_residual: min ‖F + J_L λ − μ + ν‖/‖F‖ [-] of Eq. 17 over the multipliers λ of the
+        kkt_residual: `min ‖F + J_L λ − μ + ν‖/‖F‖` [-] of Eq. 17 over the multipliers λ of the
             balance, μ ≥ 0 and ν ≥ 0 of the bounds; None if the tensions need not be the least.
-        condition: Condition number of K_θ [-], made dimensionless with the arm's length.
+        condition: Condition number of `K_θ` [-], made dimensionless with the arm's length.
         remedies: Changes that would make an unstable arm stable, each alone; empty for a stable
             arm, and if friction makes it unstable.
         faults: Reasons not to use the stiffness, one text each; empty if there are none.
@@ -147,7 +148,7 @@ class Report(Result):
 
     @property
     def model(self) -> str:
-        """What K_θ is, and in which axes it is read."""
+        """What `K_θ` is, and in which axes it is read."""
         sentence = (
             "K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle. F is tension, the "
             "cables' torque −J_Lᵀ F, the wrench W a dead load; readings are in base axes."

@@ -25,7 +25,7 @@ class Shares(Result, IndexedByName, Plotted):
         direction: Unit direction (3,), base axes.
         passive: Of each cable's elasticity, (C,) [N/m].
         active: Of each cable's tension, (C,) [N/m]; usually negative.
-        terms: Of each other term of K_θ [N/m], by its name: gravity, load, springs, …
+        terms: Of each other term of `K_θ` [N/m], by its name: gravity, load, springs, …
         model: Assumptions of the stiffness in words, such as locked motors.
         warnings: Of an unstable arm, the sentence that says so: its contributions mean nothing.
     """

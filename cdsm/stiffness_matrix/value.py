@@ -55,25 +55,26 @@ _ORTHOGONAL = 1e-9  # largest product of two unit directions that are orthogonal
 class Stiffness(Result, Loaded):
     """Joint stiffness and Cartesian stiffness (at ``tool0``, base axes) with all they depend on.
 
-    K_θ is singular, and SingularStiffness raised, if the smallest singular value of D^-½ K_θ D^-½
-    is at most 1e-8 of the largest entry of D^-½ P D^-½. P is the sum of the magnitudes of the
-    terms, which may cancel; its diagonal D makes the test free of units.
+    `K_θ` is singular, and SingularStiffness raised, if the smallest singular value of
+    `D^-½ K_θ D^-½` is at most 1e-8 of the largest entry of `D^-½ P D^-½`. P is the sum of the
+    magnitudes of the terms, which may cancel; its diagonal D makes the test free of units.
 
     Attributes:
         posture: The posture.
-        terms: The terms of K_θ by name, in the order of Eq. 16, each (nv, nv) [N m/rad]: active,
+        terms: The terms of `K_θ` by name, in the order of Eq. 16, each (nv, nv) [N m/rad]: active,
             passive, gravity, load, springs, and those of :meth:`Manipulator.with_terms`.
-        joint: K_θ, sum of the terms (nv, nv) [N m/rad]: row torque, column angle.
+        joint: `K_θ`, sum of the terms (nv, nv) [N m/rad]: row torque, column angle.
         tension: F (C,) [N].
         applied: What acts: W (6,) at the tip, or loads on links.
-        cable_stiffness: Diagonal of K_L (C,) [N/m], of cables without friction and without their
+        cable_stiffness: Diagonal of `K_L` (C,) [N/m], of cables without friction and without their
             motors; 0 for force-controlled ones.
-        free_length: l_0 (C,) [m] held since another posture; None if motors are locked at this one.
+        free_length: `l_0` (C,) [m] held since another posture; None if motors are locked at this
+            one.
         distribution: The :class:`~cdsm.Tension` that gave the tensions; None for your own.
         friction: ``"frictionless"``; ``"stuck"``: the cables stick in all holes with friction;
             ``"sliding"``: they slide in some of them.
         segment_tension: T (S,) [N] of :attr:`Posture.segments`; None if frictionless.
-        tension_gradient: ∂T/∂θ (S, nv) [N/rad] of these segments; None if frictionless.
+        tension_gradient: `∂T/∂θ` (S, nv) [N/rad] of these segments; None if frictionless.
 
     Example:
         >>> import cdsm
@@ -100,36 +101,36 @@ class Stiffness(Result, Loaded):
 
     @tabulated
     def active(self) -> Array:
-        """H_L·F (nv, nv) [N m/rad]; also called geometric."""
+        """`H_L·F` (nv, nv) [N m/rad]; also called geometric."""
         return self.terms["active"]
 
     @tabulated
     def passive(self) -> Array:
-        """J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic.
+        """`J_Lᵀ K_L J_L` (nv, nv) [N m/rad]; also called material or elastic.
 
-        Where motors yield, :attr:`wire_stiffness` is in the place of K_L. With friction it is
-        Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the cable segments j, not symmetric if cables slide.
+        Where motors yield, :attr:`wire_stiffness` is in the place of `K_L`. With friction it is
+        `Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ` over the cable segments j, not symmetric if cables slide.
         """
         return self.terms["passive"]
 
     @tabulated
     def gravity(self) -> Array:
-        """∂g/∂θ (nv, nv) [N m/rad]."""
+        """`∂g/∂θ` (nv, nv) [N m/rad]."""
         return self.terms["gravity"]
 
     @tabulated
     def load(self) -> Array:
-        """−∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment."""
+        """`−∂(J_Xᵀ W)/∂θ` (nv, nv) [N m/rad]; not symmetric if W has a moment."""
         return self.terms["load"]
 
     @tabulated
     def springs(self) -> Array:
-        """Of the joint springs (nv, nv) [N m/rad]: diag k, or Sᵀ diag k S of coupled joints."""
+        """Of the joint springs (nv, nv) [N m/rad]: diag k, or `Sᵀ diag k S` of coupled joints."""
         return self.terms["springs"]
 
     @property
     def motor_compliance(self) -> Array:
-        """B k_m⁻¹ Bᵀ (C, C) [m/N]: how much longer the motors make the cables per tension.
+        """`B k_m⁻¹ Bᵀ` (C, C) [m/N]: how much longer the motors make the cables per tension.
 
         It is 0 for rigid motors, and ±inf between cables of a motor that holds its torque.
         """
@@ -137,7 +138,7 @@ class Stiffness(Result, Loaded):
 
     @cached_property
     def wire_stiffness(self) -> Array:
-        """K_eff = (K_L⁻¹ + B k_m⁻¹ Bᵀ)⁻¹ (C, C) [N/m]: tensions per elongation of the cables.
+        """`K_eff = (K_L⁻¹ + B k_m⁻¹ Bᵀ)⁻¹` (C, C) [N/m]: tensions per elongation of the cables.
 
         It is diag k of :attr:`cable_stiffness` if no motor yields.
         """
@@ -151,7 +152,7 @@ class Stiffness(Result, Loaded):
 
     @property
     def free_lengths(self) -> Array:
-        """Original lengths l_0 (C,) [m] of the wires, see :class:`Cable`; L if force-controlled."""
+        """Original lengths `l_0` (C,) [m] of the wires (:class:`Cable`); L if force-controlled."""
         laws = self.posture.arm.laws
         L = self.posture.cable_lengths
         l_0 = self.free_length
@@ -159,7 +160,7 @@ class Stiffness(Result, Loaded):
 
     @tabulated
     def residual(self) -> Array:
-        """J_Lᵀ F − (J_Xᵀ W − g) + k (q − q_0) (nv,) [N m]; zero if the tensions balance the arm."""
+        """`J_Lᵀ F − (J_Xᵀ W − g) + k (q − q_0)` (nv,) [N m]; zero if the arm is in balance."""
         pose = self.posture
         F = self.tension
         J = self.posture.length_jacobian
@@ -170,7 +171,7 @@ class Stiffness(Result, Loaded):
 
     @tabulated
     def margin(self) -> float:
-        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; if negative, the arm buckles.
+        """Smallest eigenvalue of the symmetric part of `K_θ` [N m/rad]; below 0 the arm buckles.
 
         With prismatic and revolute joints, the value depends on the unit of length, not its sign.
         """
@@ -183,7 +184,7 @@ class Stiffness(Result, Loaded):
 
     @property
     def is_stable(self) -> bool:
-        """Whether the symmetric part of K_θ is positive definite."""
+        """Whether the symmetric part of `K_θ` is positive definite."""
         return self.margin > 0.0
 
     @quantity("1")
@@ -191,13 +192,13 @@ class Stiffness(Result, Loaded):
         """Names of the cables at 0 N that have a stiffness: they resist only what stretches them.
 
         0 N is a tension below 1e-9 of the largest one. :meth:`along` and :meth:`shares` let these
-        cables pull or hang loose; K_θ and all that follows from it count them as taut.
+        cables pull or hang loose; `K_θ` and all that follows from it count them as taut.
         """
         return tuple(self.posture.arm.cables.names[c] for c in np.flatnonzero(self._slack))
 
     @cached_property
     def without_slack(self) -> Array:
-        """K_θ without the stiffness of the cables at 0 N (nv, nv) [N m/rad]."""
+        """`K_θ` without the stiffness of the cables at 0 N (nv, nv) [N m/rad]."""
         J = self.posture.length_jacobian
         k = np.where(self._slack, self.cable_stiffness, 0.0)
         if self._yielding is None:
@@ -234,14 +235,14 @@ class Stiffness(Result, Loaded):
 
     @cached_property
     def compliance(self) -> Array:
-        """Compliance C = J_X K_θ⁻¹ J_Xᵀ (6, 6): tip motion per wrench at the tip.
+        """Compliance `C = J_X K_θ⁻¹ J_Xᵀ` (6, 6): tip motion per wrench at the tip.
 
-        Linear rows first: C_vv [m/N], C_vω [m/(N m)] = [rad/N], C_ωω [rad/(N m)].
+        Linear rows first: `C_vv` [m/N], `C_vω` [m/(N m)] = [rad/N], `C_ωω` [rad/(N m)].
         """
         return frozen(readings.compliance(self._inverse, self.posture.jacobian))
 
     def compliance_at(self, frame: str = "base", at: str | ArrayLike = "tip") -> Array:
-        """Compute the compliance T C Tᵀ (6, 6) in another frame and at another point of the tip.
+        """Compute the compliance `T C Tᵀ` (6, 6) in another frame and at another point of the tip.
 
         T is the 6 × 6 of the lever from the tip to the point, turned into the axes of the frame.
 
@@ -252,7 +253,7 @@ class Stiffness(Result, Loaded):
 
         Raises:
             InvalidInput: There is no such link, or ``at`` is not (3,).
-            SingularStiffness: K_θ is singular.
+            SingularStiffness: `K_θ` is singular.
 
         Example:
             >>> import cdsm
@@ -272,7 +273,7 @@ class Stiffness(Result, Loaded):
 
         Raises:
             InvalidInput: There is no such link, or ``at`` is not (3,).
-            SingularStiffness: K_θ is singular, or the tip lacks one of its six motions, which the
+            SingularStiffness: `K_θ` is singular, or the tip lacks one of its six motions, which the
                 error names. Rank is judged at 1e-9 with the arm's length as lever.
 
         Example:
@@ -299,7 +300,7 @@ class Stiffness(Result, Loaded):
 
     @cached_property
     def cartesian(self) -> Array:
-        """Matrix (C_vv)⁻¹ (3, 3) [N/m]: force per tip displacement, with the tip free to rotate.
+        """Matrix `(C_vv)⁻¹` (3, 3) [N/m]: force per tip displacement, with the tip free to rotate.
 
         A diagonal entry is the stiffness if the other two translations are *locked*. For a stable
         arm it is never less than :meth:`along` that axis, and often several times larger.
@@ -308,7 +309,7 @@ class Stiffness(Result, Loaded):
         return self._cartesian_in(None)
 
     def cartesian_in(self, directions: Iterable[Direction]) -> Array:
-        """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m]: force per tip displacement in some directions only.
+        """Compute `(U C_vv Uᵀ)⁻¹` (n, n) [N/m]: force per tip displacement in some directions only.
 
         Use it for planar arms: their tip cannot leave a plane, so :attr:`cartesian` does not exist.
         U are n orthogonal directions in base axes: names as ``("x", "z")``, or (n, 3); InvalidInput
@@ -324,17 +325,18 @@ class Stiffness(Result, Loaded):
     ) -> float:
         """Compute the tangent stiffness [N/m] that a small force along +u measures (Eq. 20).
 
-        It is 1/(uᵀ C_vv u). Cables at 0 N (:attr:`slack`) only add tension: the stiffness is then
-        1/(τᵀ x), in which the joint motion x has the least energy ½ xᵀ K_0 x + ½ Σ k_c max(J_c x,
-        0)² − τᵀ x under the torque τ = J_vᵀ u; K_0 is K_θ without these cables. It differs for u
-        and −u. With a moment in W, x solves the equilibrium instead, which has no potential. With
-        friction (:attr:`friction`), cables at 0 N count as taut.
+        It is `1/(uᵀ C_vv u)`. Cables at 0 N (:attr:`slack`) only add tension: the stiffness is then
+        `1/(τᵀ x)`, in which the joint motion x has the least energy
+        `½ xᵀ K_0 x + ½ Σ k_c max(J_c x, 0)² − τᵀ x` under the torque `τ = J_vᵀ u`; `K_0` is `K_θ`
+        without these cables. It differs for u and −u. With a moment in W, x solves the equilibrium
+        instead, which has no potential. With friction (:attr:`friction`), cables at 0 N count as
+        taut.
 
         u is an axis such as ``"z"`` or ``"-z"``, or (3,) in base axes, any length, else
         InvalidInput. A weight that is not small beside the tensions measures a secant:
         :func:`~cdsm.weight_test`. The stiffness is inf if the tip cannot move along u, and may be
-        negative if the arm is unstable. SingularStiffness if K_θ is singular, or if the arm is
-        unstable to one side: K_0 is not positive definite.
+        negative if the arm is unstable. SingularStiffness if `K_θ` is singular, or if the arm is
+        unstable to one side: `K_0` is not positive definite.
 
         ``link`` is where the force acts and the displacement is read, instead of the tip: at the
         ``point`` (3,) [m] in the frame of the link; None: its disk, or its frame (:class:`Load`).
@@ -351,7 +353,7 @@ class Stiffness(Result, Loaded):
         return self.tip_response(u, J_v=J_v)[0]
 
     def compliance_between(self, read: str, load: str) -> Array:
-        """Compute J_a K_θ⁻¹ J_bᵀ (6, 6): motion of the link ``read`` per wrench on ``load``.
+        """Compute `J_a K_θ⁻¹ J_bᵀ` (6, 6): motion of the link ``read`` per wrench on ``load``.
 
         The points of the links are those of :class:`~cdsm.Load`. Raises InvalidInput if there is no
         such link, SingularStiffness as :attr:`compliance`.
@@ -364,11 +366,12 @@ class Stiffness(Result, Loaded):
         return jacobian_at(self.posture, link_point(self.posture.arm, link, point))
 
     def pseudoinverse(self, term: str = "joint") -> Array:
-        """Compute J⁺ᵀ K J⁺ (3, 3) [N/m], J the linear rows of J_X: the paper's K_R, read literally.
+        """Compute `J⁺ᵀ K J⁺` (3, 3) [N/m], J the linear rows of `J_X`: the printed `K_R`.
 
-        The paper's figures use it, but J⁺ allows only the joint motion of least norm: the result is
-        4 % to over 100 % larger than :attr:`cartesian`. ``term`` is a part of K_θ, or ``"joint"``.
-        InvalidInput if it is neither, SingularStiffness if the tip hardly moves in some direction.
+        The paper's figures use it, but `J⁺` allows only the joint motion of least norm: the result
+        is 4 % to over 100 % larger than :attr:`cartesian`. ``term`` is a part of `K_θ`, or
+        ``"joint"``. InvalidInput if it is neither, SingularStiffness if the tip hardly moves in
+        some direction.
         """
         names = (*self.terms, "joint")
         matrix = {**self.terms, "joint": self.joint}[one_of("stiffness term", term, names)]
@@ -384,10 +387,10 @@ class Stiffness(Result, Loaded):
         return self.joint_compliance()
 
     def joint_compliance(self, joints: Joints = slice(None)) -> Array:
-        """Compute K_θ⁻¹ (n, n) [rad/(N m)] of n joints by their numbers, all others held.
+        """Compute `K_θ⁻¹` (n, n) [rad/(N m)] of n joints by their numbers, all others held.
 
         Raises:
-            SingularStiffness: K_θ of these joints is singular; the error has their motion.
+            SingularStiffness: `K_θ` of these joints is singular; the error has their motion.
         """
         K = self.joint[joints][:, joints]
         magnitudes = self.magnitudes[joints][:, joints]
@@ -491,8 +494,8 @@ class Stiffness(Result, Loaded):
     def shares(self, direction: Direction) -> Shares:
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
-        If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ, and K_θ
-        is a sum over cables and other terms. SingularStiffness also if it is inf.
+        If δθ is the joint motion per unit tip displacement along u, `along(u) = δθᵀ K_θ δθ`, and
+        `K_θ` is a sum over cables and other terms. SingularStiffness also if it is inf.
 
         Example:
             >>> import cdsm

@@ -17,4 +17,4 @@ def attributes_of(documented: object) -> dict[str, str]:
 
 def in_plain_text(text: str) -> str:
     """Return a text of a docstring without its markup."""
-    return re.sub(r":\w+:`~?(?:\w+\.)*([^`.]*)`", r"\1", text).replace("``", "")
+    return re.sub(r":\w+:`~?(?:\w+\.)*([^`.]*)`", r"\1", text).replace("`", "")

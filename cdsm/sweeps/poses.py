@@ -151,8 +151,8 @@ class PathPoses(ReadOnlyState, PoseSet):
 
     Attributes:
         waypoints: Joint angles (n, nv) [rad] of two or more postures.
-        count: Number of postures at equal distances √Σδθ² along the path, both ends included; None
-            uses the waypoints themselves.
+        count: Number of postures at equal distances `√(Σ δθ²)` along the path, both ends included;
+            None uses the waypoints themselves.
 
     Raises:
         InvalidInput: ``waypoints`` are not (n, nv), n ≥ 2, or all equal; or ``count`` is below 2.
@@ -242,9 +242,9 @@ class PlanePoses(PoseSet):
     """Postures whose tips fill a plane: a grid of tips, for maps of the workspace.
 
     The grid is as large as the tip can reach. Each posture is continued from that of a neighbour,
-    and goes back to the straight arm as far as its tip allows: steps towards min ‖θ − θ_0‖² with
-    tip(θ) = target, where θ_0 is 0, or the limit nearest to 0. A tip that no neighbour leads to has
-    NaN for its angles, and the status OUT_OF_REACH in a sweep. The dimensions are the other two
+    and goes back to the straight arm as far as its tip allows: steps towards `min ‖θ − θ_0‖²` with
+    `tip(θ) = target`, where `θ_0` is 0, or the limit nearest to 0. A tip that no neighbour leads to
+    has NaN for its angles, and the status OUT_OF_REACH in a sweep. The dimensions are the other two
     axes, such as ``tip_y`` and ``tip_z``.
 
     Attributes:

@@ -81,7 +81,7 @@ class Tension(Result, Loaded, IndexedByName):
 
     @quantity("torque", "joint")
     def residual(self) -> Array:
-        """Residual J_Lᵀ F − (J_Xᵀ W − g) of Eq. 13, (nv,) [N m]."""
+        """Residual `J_Lᵀ F − (J_Xᵀ W − g)` of Eq. 13, (nv,) [N m]."""
         torque = self.values @ self.posture.length_jacobian
         return frozen(torque - required_torque(self.posture, self.applied))
 
@@ -161,7 +161,7 @@ def distribute_tension(
     worst_friction: bool = False,
     assembly: Assembly | None = None,
 ) -> Tension:
-    """Compute the smallest tensions in balance: min ½‖F‖² with J_Lᵀ F = J_Xᵀ W − g (Eqs. 13, 17).
+    """Compute the least tensions in balance: `min ½‖F‖²`, `J_Lᵀ F = J_Xᵀ W − g` (Eqs. 13, 17).
 
     Args:
         pose: The posture.
@@ -173,12 +173,12 @@ def distribute_tension(
         fixed: Tensions [N] by cable name, e.g. of motors that control force. They replace the
             bounds of their cables; the other tensions are computed.
         worst_friction: Keep the tension of each segment within the bounds, for any earlier loads:
-            between F exp(−Σ μ φ) and F exp(Σ μ φ), with the friction coefficients μ and wrap angles
-            φ of the holes of its cable. The bounds of F narrow by these factors.
+            between `F exp(−Σ μ φ)` and `F exp(Σ μ φ)`, with the friction coefficients μ and wrap
+            angles φ of the holes of its cable. The bounds of F narrow by these factors.
         assembly: Wires with the motors at 0, of :meth:`Manipulator.assemble`. The tensions are then
-            the least that its M motors give, F = f(L; l_0 − B φ), with ``commands`` φ. Without it,
-            each cable has the wire that its tension needs: motors that are fewer than cables have
-            it only if the arm was assembled for this posture, as the result says.
+            the least that its M motors give, `F = f(L; l_0 − B φ)`, with ``commands`` φ. Without
+            it, each cable has the wire that its tension needs: motors that are fewer than cables
+            have it only if the arm was assembled for this posture, as the result says.
 
     Raises:
         InvalidInput: An argument has the wrong shape or is not a number, or a minimum is above its

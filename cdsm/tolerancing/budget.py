@@ -45,10 +45,10 @@ class Uncertainty(Result, Plotted):
         measurand: What is uncertain: its name, direction or cable, and the stiffness of the arm.
         tolerances: The tolerances.
         value: The measurand of the arm without errors [N/m], [N m/rad], [m] or [N].
-        standard_uncertainty: u_c = √Σ u_i² over the sources, in the unit of the value.
-        contributions: u_i of each source that has a tolerance, largest first, in the same unit.
-        nonlinearity: RMS error of the linear approximation over 100 random arms, relative to
-            u_c [-]. The standard uncertainty of Monte Carlo differs from u_c by at most this part.
+        standard_uncertainty: `u_c = √(Σ u_i²)` over the sources, in the unit of the value.
+        contributions: `u_i` of each source that has a tolerance, largest first, in the same unit.
+        nonlinearity: RMS error of the linear approximation over 100 random arms, relative to `u_c`
+            [-]. The standard uncertainty of Monte Carlo differs from `u_c` by at most this part.
         failed: Number of these arms for which the measurand does not exist.
     """
 
@@ -94,7 +94,7 @@ class Uncertainty(Result, Plotted):
         return derivatives
 
     def interval(self, probability: float = 0.95) -> tuple[float, float]:
-        """Return the coverage interval value ± k u_c, with k of the normal distribution.
+        """Return the coverage interval value `± k u_c`, with k of the normal distribution.
 
         Raises InvalidInput if the probability is not between 0 and 1.
         """
@@ -180,11 +180,12 @@ def uncertainty(
 ) -> Uncertainty:
     """Compute the standard uncertainty of a number of an arm to first order (JCGM 100, Eq. 13).
 
-        u_c² = Σ_s u_s² ((1 − ρ_s) g_s·g_s + ρ_s (Σ g_s)²)
+        `u_c² = Σ_s u_s² ((1 − ρ_s) g_s·g_s + ρ_s (Σ g_s)²)`
 
-    Each source s of uncertainty (such as all hole radii) has the standard uncertainty u_s, the
-    correlation ρ_s of its inputs, and the derivatives g_s of the measurand with respect to them.
-    These are central differences between arms with errors of ± u_s/10 (JCGM 100, 5.1.3, Note 2).
+    Each source s of uncertainty (such as all hole radii) has the standard uncertainty `u_s`, the
+    correlation `ρ_s` of its inputs, and the derivatives `g_s` of the measurand with respect to
+    them. These are central differences between arms with errors of `± u_s/10` (JCGM 100, 5.1.3,
+    Note 2).
 
     The tensions of a real arm are measured: they have errors of their own. That they balance the
     arm, which ties these errors to those of angles and dimensions, is not used. The tensions of an
@@ -197,8 +198,8 @@ def uncertainty(
         tolerances: Tolerances of the arm, the angles and the tensions; None: those of the arm, with
             the scatter of EA of its ropes.
         direction: u in base axes, for ``"along"`` and ``"tip_along"`` only.
-        of: ``"along"``: the stiffness along u [N/m], without friction. ``"margin"``: the
-            smallest eigenvalue of K_θ [N m/rad]. ``"tip_along"``: the tip's coordinate along u [m].
+        of: ``"along"``: the stiffness along u [N/m], without friction. ``"margin"``: the smallest
+            eigenvalue of `K_θ` [N m/rad]. ``"tip_along"``: the tip's coordinate along u [m].
             ``"tension"``: the least tension of a cable [N], always distributed again.
         cable: Name of the cable, for ``"tension"`` only.
         wrench: What acts with your own tensions, as for :func:`~cdsm.stiffness`.

@@ -24,10 +24,10 @@ _SHORTEST: Final = 0.5  # length of a slack wire over that at the low end of its
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Elasticity(Plotted):
-    """Axial elasticity of a wire: its law EA(F), with the strain ε(F) = ∫ dF/EA.
+    """Axial elasticity of a wire: its law EA(F), with the strain `ε(F) = ∫ dF/EA`.
 
-    A wire of original length l_0 has the stiffness dF/dL = EA(F)/l_0: EA is the *tangent* rigidity.
-    :class:`~cdsm.LinearElasticity`, :class:`~cdsm.StrandElasticity`,
+    A wire of original length `l_0` has the stiffness `dF/dL = EA(F)/l_0`: EA is the *tangent*
+    rigidity. :class:`~cdsm.LinearElasticity`, :class:`~cdsm.StrandElasticity`,
     :class:`~cdsm.TabulatedElasticity` and :meth:`from_rigidity` only make the table of ε(F) that
     every law is. Laws made of equal values are equal. Tensions F [N] and strains may have any
     shape; results have it too. All methods of F raise ElasticityRangeError outside [low, high].
@@ -63,9 +63,9 @@ class Elasticity(Plotted):
         """Make a law from a function EA(F), which is sampled once, to 1e-8 of EA between samples.
 
         ``rigidity`` returns EA [N] at an array of tensions from ``low`` to ``high`` [N]; corners of
-        EA(F), at the tensions ``joins`` [N], are rounded off within about 1 N. Raises InvalidInput
-        if the function fails, is not positive, jumps or has other corners, or if 0 <= low < joins <
-        high does not hold.
+        EA(F), at the tensions ``joins`` [N], are rounded off within about 1 N. Raises
+        InvalidInput if the function fails, is not positive, jumps or has other corners, or if 0 <=
+        low < joins < high does not hold.
         """
         from cdsm.wires.laws import rising, tabulate
 
@@ -106,10 +106,10 @@ class Elasticity(Plotted):
         return Elasticity(**vars(self) | {"factor": self.factor * float(factor)})
 
     def slack_below(self) -> Elasticity:
-        """Return the law continued to 0 N with the rigidity of its low end F_0 (an assumption).
+        """Return the law continued to 0 N with the rigidity of its low end `F_0` (an assumption).
 
-        The strain stays zero at F_0, so nothing changes above. Below, ε = (F − F_0)/EA is negative.
-        Raises InvalidInput if the slack wire would be shorter than half its length.
+        The strain stays zero at `F_0`, so nothing changes above. Below, `ε = (F − F_0)/EA` is
+        negative. Raises InvalidInput if the slack wire would be shorter than half its length.
         """
         low = self.low
         EA = float(self.rigidity(self.low))
@@ -126,7 +126,7 @@ class Elasticity(Plotted):
         return self.strain_and_rigidity(tension)[1]
 
     def strain(self, tension: ArrayLike) -> Array:
-        """Compute the strain ε = Δl/l_0 = ∫ dF/EA [-] from :attr:`rest` to F [N], any shape."""
+        """Compute the strain `ε = Δl/l_0 = ∫ dF/EA` [-] from :attr:`rest` to F [N], any shape."""
         return self.strain_and_rigidity(tension)[0]
 
     def strain_and_rigidity(self, tension: ArrayLike) -> tuple[Array, Array]:
@@ -135,12 +135,12 @@ class Elasticity(Plotted):
         return np.asarray(strain), np.asarray(EA)
 
     def rigidity_slope(self, tension: ArrayLike) -> Array:
-        """Compute dEA/dF [-] at F [N], any shape; zero below :attr:`rest`."""
+        """Compute `dEA/dF` [-] at F [N], any shape; zero below :attr:`rest`."""
         F = number_array("tension", tension)
         return self.slope_at(F, self.evaluate(self.require_inside(F))[1])
 
     def slope_at(self, F: Array, EA: Array) -> Array:
-        """Compute dEA/dF [-] at tensions F [N] of the law, with EA [N] there: −EA² ε″."""
+        """Compute `dEA/dF` [-] at tensions F [N] of the law, with EA [N] there: `−EA² ε″`."""
         piece, x = self._place(F.clip(self.rest))
         rows = self._coefficients.take(piece, axis=1)
         bend = np.zeros_like(x)
@@ -149,7 +149,7 @@ class Elasticity(Plotted):
         return np.where(self.rest > F, 0.0, -bend * EA**2 / self.factor)
 
     def energy(self, tension: ArrayLike) -> Array:
-        """Compute ∫ F dε [N] = [J/m], from :attr:`rest` to F [N], any shape."""
+        """Compute `∫ F dε` [N] = [J/m], from :attr:`rest` to F [N], any shape."""
         F = self.require_inside(number_array("tension", tension))
         moment = polyint(self._coefficients)
         moment[0, 1:] = np.cumsum(polyval(np.diff(self._knots), moment, tensor=False))[:-1]

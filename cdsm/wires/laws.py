@@ -64,7 +64,7 @@ class LinearElasticity(Elasticity):
 
     @classmethod
     def of_wire(cls, young_modulus: float, diameter: float) -> LinearElasticity:
-        """Return EA = E π d²/4 of a solid wire, E [Pa] and d [m] positive, else InvalidInput."""
+        """Return `EA = E π d²/4` of a solid wire, E [Pa] and d [m] positive, else InvalidInput."""
         for name, value in (("young_modulus", young_modulus), ("diameter", diameter)):
             if scalar(name, value) <= 0.0:
                 raise InvalidInput(name, f"{value:g} given; it must be positive.")
@@ -78,7 +78,7 @@ class StrandElasticity(Elasticity):
     Neighbouring polynomials meet at their join, within 1e-9 of EA. A corner there is bridged
     smoothly: within 1.4 N of 31 N, EA of Eq. 19 differs by up to 0.7 % from its polynomials;
     elsewhere by 1e-8 at most. They give the *tangent* rigidity: if they gave the secant S of
-    Eq. 18, the tangent S²/(S − F S') would be negative up to 31 N.
+    Eq. 18, the tangent `S²/(S − F S′)` would be negative up to 31 N.
 
     ``coefficients`` are one tuple per range, lowest power first [N, 1, 1/N, …]; ``joins`` are the
     tensions [N] at which one range ends and the next begins. Raises InvalidInput if a number is
@@ -139,9 +139,10 @@ class StrandElasticity(Elasticity):
 class TabulatedElasticity(Elasticity):
     """Strain as an increasing function of tension, through measured points of any wire.
 
-    The curve is a C1 cubic between two points. Its slopes follow from a natural spline of ln Δε/ΔF
-    of the chords over the middles of their strains, limited to ½ and 2½ times the chords beside.
-    The error of EA is largest in the first steps from a soft low end: give more points there.
+    The curve is a C1 cubic between two points. Its slopes follow from a natural spline of ln(Δε/ΔF)
+    of the chords over the middles of their strains, limited to ½ and 2½ times the chords
+    beside. The error of EA is largest in the first steps from a soft low end: give more points
+    there.
 
     ``tensions`` [N] and ``strains`` [-] of two or more points must rise, tensions from 0 or more,
     or InvalidInput is raised. Only differences of strains matter.

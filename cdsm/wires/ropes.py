@@ -100,7 +100,7 @@ ROPES: Final[dict[str, Construction]] = {
 class RopeElasticity(Elasticity):
     """Constant EA of a rope, from its construction and diameter, with its scatter and source.
 
-    EA = (EA/d²) d² holds for a rope that was stretched before, above some 20 % of its breaking
+    `EA = (EA/d²) d²` holds for a rope that was stretched before, above some 20 % of its breaking
     force; below, ropes are softer. Measure yours: :func:`~cdsm.fit_tensile_test`.
 
     ``rope`` is 1x7, 1x19, 7x7, 7x19 (stainless steel 316) or uhmwpe, ``diameter`` d is in m, and

@@ -148,7 +148,7 @@ def fit_tensile_test(
     *,
     between: tuple[float, float] = (-np.inf, np.inf),
 ) -> TensileFit:
-    r"""Fit the tangent rigidity EA(F) = l_0 dF/dΔl [N] of a wire to its tensile test.
+    r"""Fit the tangent rigidity `EA(F) = l_0 dF/dΔl` [N] of a wire to its tensile test.
 
     The forces are fitted by a C1 curve with EA > 0, whose ln EA is a spline. Its smoothness follows
     from the data (restricted likelihood).
@@ -160,7 +160,7 @@ def fit_tensile_test(
     names the other branches. What the wire creeps in a hold on the way is taken out.
 
     The law ends where plasticity begins: from there on, EA stays below 0.8 of its plateau, beyond
-    its uncertainty. The first stage, pre-tensioning, ends where EA begins to grow slower than √F.
+    its uncertainty. The first stage, pre-tensioning, ends where EA begins to grow slower than `√F`.
 
     A strain above 1, or a rigidity outside 1 N to 1e9 N, is refused as a wrong unit. A rigidity
     below 1 kN is doubted in ``notes``: kN, or exchanged columns?
@@ -168,7 +168,7 @@ def fit_tensile_test(
     Args:
         displacement: Δl, shape (n,) [m], in the order recorded.
         force: F, shape (n,) [N].
-        gauge_length: l_0 [m].
+        gauge_length: `l_0` [m].
         between: Smallest and largest force to fit [N]. It also chooses the branch: the last one
             that reaches 95 % of its upper end.
 

@@ -82,8 +82,8 @@ def read_tensile_csv(
             ``lbf`` or ``kgf``.
         decimal: Decimal mark, ``.`` or ``,``; the other one may then separate thousands. Default: a
             point, or a comma if commas do not separate the columns; no thousands.
-        gauge_length: l_0 [m]; it counts more than that of the file. A strain needs none, as EA does
-            not depend on it: the result is then a test of 1 m of wire, and ``source`` says so.
+        gauge_length: `l_0` [m]; it counts more than that of the file. A strain needs none, as EA
+            does not depend on it: the result is then a test of 1 m of wire, and ``source`` says so.
 
     Raises:
         InvalidInput: ``columns`` or ``units`` are not two texts; ``decimal`` is another mark.
