@@ -255,6 +255,11 @@ def load_at(at: LinkPoint | None, wrench: Array) -> Applied:
     return frozen(wrench) if at is None else Loads((PointLoad(at, wrench),))
 
 
+def force_at(at: LinkPoint | None, force: Array) -> Applied:
+    """Return what a force (3,) [N] at a point is; None: at the tip."""
+    return load_at(at, np.append(force, np.zeros(3)))
+
+
 def jacobian_at(pose: Posture, at: LinkPoint | None) -> Array:
     """Return the motion (6, nv) of a point by the joints; None: of the tip."""
     return pose.jacobian if at is None else at.jacobian(pose)

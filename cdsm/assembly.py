@@ -109,10 +109,7 @@ class Assembly(Result):
         if driven.rest_length[c] <= 0.0:
             left = f"leave {driven.rest_length[c]:.4g} m of {arm.cables.names[c]}"
             raise InvalidInput("motors", f"{left}, which is {self.free_lengths[c]:.4g} m long.")
-        c = int(driven.tension.argmin())
-        if driven.tension[c] < 0.0:
-            name = arm.cables.names[c]
-            raise InvalidInput("motors", f"{driven.tension[c]:g} N for {name}; cables only pull.")
+        arm.cables.require_pulling("motors", driven.tension)
         for motor, torque in zip(arm.motors.given, commands, strict=False):
             if motor.control == "torque" and not motor.can_give(float(torque)):
                 side = "0 or more" if torque < 0.0 else "0 or less"
@@ -171,9 +168,7 @@ def assemble(pose: Any, tension: ArrayLike) -> Assembly:
         raise InvalidInput("tension", "is of another posture; distribute it at this one.")
     count = len(arm.cables)
     F = vector("tension", given, count, "one tension [N] per cable", "tension")
-    if F.min() < 0.0:
-        c = int(F.argmin())
-        raise InvalidInput("tension", f"{F[c]:g} N for {arm.cables.names[c]}; cables only pull.")
+    arm.cables.require_pulling("tension", F)
     lengths = arm.laws.original_lengths(pose.cable_lengths, F)
     arm.laws.require_wire(lengths, F)
     return Assembly(posture=pose, tension=F, free_lengths=lengths)

@@ -22,7 +22,7 @@ from cdsm.support.validation import (
     number,
     number_array,
     one_of,
-    scalar,
+    positive,
     text,
 )
 from cdsm.support.values import Array
@@ -218,16 +218,23 @@ class Cables(tuple[Cable, ...]):
     @overload
     def __getitem__(self, which: slice, /) -> tuple[Cable, ...]: ...
     def __getitem__(self, which: SupportsIndex | slice | str, /) -> Cable | tuple[Cable, ...]:
-        if isinstance(which, str):
-            which = self.names.index(one_of("cable", which, self.names))
-        return super().__getitem__(which)
+        return super().__getitem__(self.number_of(which) if isinstance(which, str) else which)
+
+    def number_of(self, name: object) -> int:
+        """Return the place of a cable in every (C,) array; InvalidInput if there is no such one."""
+        return self.names.index(one_of("cable", name, self.names))
+
+    def require_pulling(self, argument: str, tension: Array) -> None:
+        """Raise InvalidInput if an entry of an ``argument``, tensions (…, C) [N], is negative."""
+        if tension.min(initial=0.0) < 0.0:
+            *row, c = np.unravel_index(int(tension.argmin()), tension.shape)
+            where = f"{self[c].name} in row {row[0]}" if row else self[c].name
+            problem = f"{tension.min():g} N given for {where}; cables only pull."
+            raise InvalidInput(argument, problem)
 
 
 def _length(value: float) -> float:
-    length = scalar("free_length", value)
-    if length <= 0.0:
-        raise InvalidInput("free_length", f"{length:g} m given; a positive number is needed.")
-    return length
+    return positive("free_length", value, "m")
 
 
 def serpentine_cables(

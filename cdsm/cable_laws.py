@@ -46,6 +46,8 @@ class CableLaws:
         rest: Tension (C,) [N] at which wire strain and spring elongation are zero.
         constant: EA (C,) [N] of position-controlled cables with a linear law; 0 for all others.
         linear: Whether a cable is one of these (C,), as 1 or 0: EA (1 + ε) is then EA + F.
+        low: Lower ends (C,) [N] of the domains of the laws; 0 where a motor controls the force.
+        high: Upper ends (C,) [N]; inf where a motor controls the force, which needs no law.
     """
 
     def __init__(self, cables: tuple[Cable, ...], *, whole: bool = True) -> None:
@@ -71,6 +73,13 @@ class CableLaws:
         self._may_fail = self._sprung or bool(self.nonlinear)
         self.constant = frozen(constant)
         self.linear = frozen(linear)
+        self.low = np.zeros(len(cables))
+        self.high = np.full(len(cables), np.inf)
+        for law, group in self.held:
+            self.low[group] = law.low
+            self.high[group] = law.high
+        frozen(self.low)
+        frozen(self.high)
 
     def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Return the tension bounds ``low``, ``high`` (…, C) [N], narrowed to the cables' own."""

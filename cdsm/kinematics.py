@@ -26,7 +26,7 @@ from cdsm.status import Status
 from cdsm.support.format import aligned, beyond, place
 from cdsm.support.nearest import at_limits, nearest, range_of
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import instance, number_array, scalar, vector
+from cdsm.support.validation import fraction, instance, number_array, vector
 from cdsm.support.values import Array, frozen
 
 _Kind = Literal["position", "pose", "lengths"]
@@ -209,8 +209,7 @@ def _solve(
             limits = arm.lower[i], arm.upper[i], arm.joint_units[i]
             problem = beyond(arm.joint_names[i], near[i], *limits)
             raise InvalidInput("guess", f"{problem}; guess angles within the joint limits.")
-    if not 0.0 < (tolerance := scalar("tolerance", tolerance)) < 1.0:
-        raise InvalidInput("tolerance", f"{tolerance:g} given; a number between 0 and 1 is needed.")
+    tolerance = fraction("tolerance", tolerance)
     search = partial(nearest, partial(_residual, arm, kind, target), near, tolerance)
     lower = arm.lower  # a joint may be locked
     upper = np.maximum(arm.upper, arm.lower + 1e-12)

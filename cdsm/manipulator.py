@@ -13,7 +13,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.arm import ComputedArm
@@ -219,7 +218,7 @@ class Manipulator(ComputedArm):
 
         Other options are those of :func:`cdsm.plots.plot_arm`. Raises InvalidInput as :meth:`at`.
         """
-        pose = self.at(np.clip(0.0, self.lower, self.upper) if q is None else q)
+        pose = self.at(self.body.straight if q is None else q)
         return pose.plot(ax=ax, **options)
 
     def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:

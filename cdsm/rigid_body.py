@@ -210,6 +210,11 @@ class RigidBody:
         axis = place.rotation @ self._twists[row, 3:]
         return link, rotation.T @ (place.translation - translation), rotation.T @ axis
 
+    @cached_property
+    def straight(self) -> Array:
+        """Joint angles (nv,) [rad] of the straight arm: 0, or the limit nearest to 0."""
+        return frozen(np.clip(np.zeros(self.nv), self.lower, self.upper))
+
     def joints_to(self, row: int) -> list[int]:
         """Return the rows of the joints from the base to the joint in ``row``, included."""
         rows: list[int] = []

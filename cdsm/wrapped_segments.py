@@ -378,7 +378,7 @@ def _middle(wraps: Wraps) -> tuple[Array, Array]:
     body = wraps.body
     finite = np.isfinite(body.lower) & np.isfinite(body.upper)
     middle = np.where(finite, (np.where(finite, body.lower, 0.0) + body.upper) / 2.0, 0.0)
-    for q in (np.where(finite, middle, 0.0), np.clip(np.zeros(body.nv), body.lower, body.upper)):
+    for q in (np.where(finite, middle, 0.0), body.straight):
         state = body.state(q)
         try:
             wrapping = wraps.at(state.twist, state.placement)

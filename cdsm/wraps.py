@@ -194,7 +194,7 @@ class Wraps:
     @property
     def doubts(self) -> tuple[str, ...]:
         """Return a text of the pulleys that no cable touches in the straight arm, if there are."""
-        state = self.body.state(np.clip(np.zeros(self.body.nv), self.body.lower, self.body.upper))
+        state = self.body.state(self.body.straight)
         try:
             touches = self.at(state.twist, state.placement).contacts.touches
         except InvalidInput:

@@ -154,14 +154,9 @@ def per_row(name: str, value: ArrayLike, rows: int, width: int, meaning: str, ki
 
 def check_tension_rows(arm: Manipulator, value: ArrayLike, rows: int) -> Array:
     """Check tensions (C,) or (rows, C) [N]; return them as a read-only array."""
-    cables = [cable.name for cable in arm.cables]
-    tension = per_row("tension", value, rows, len(cables), "one tension [N] per cable", "tension")
-    if tension.size and tension.min() < 0.0:
-        *row, c = np.unravel_index(int(tension.argmin()), tension.shape)
-        where = f" in row {row[0]}" if row else ""
-        raise InvalidInput(
-            "tension", f"{tension.min():g} N given for {cables[c]}{where}; cables only pull."
-        )
+    count = len(arm.cables)
+    tension = per_row("tension", value, rows, count, "one tension [N] per cable", "tension")
+    arm.cables.require_pulling("tension", tension)
     return tension
 
 

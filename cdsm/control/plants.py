@@ -23,7 +23,7 @@ from cdsm.statics.equilibrium import equilibrium
 from cdsm.statics.quasi_static import Action, QuasiStaticArm
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.validation import checked_quantity, instance, scalar, whole_number
+from cdsm.support.validation import checked_quantity, instance, not_negative, whole_number
 from cdsm.support.values import Array, frozen
 
 _TANGENTS: Final = 10  # number of updates of the motors' tangents and of the load per step
@@ -209,8 +209,7 @@ class MuJoCoPlant:
         need("mujoco", "mujoco")
         instance("arm", self.arm, Manipulator)
         checked_quantity("period", self.period, "time")
-        if scalar("damping_ratio", self.damping_ratio) < 0.0:
-            raise InvalidInput("damping_ratio", f"{self.damping_ratio:g} given; 0 or more needed.")
+        not_negative("damping_ratio", self.damping_ratio)
         if self.arm.has_friction:
             raise InvalidInput(
                 "arm", "has friction, which MuJoCo's cables have not; give arm.with_friction(0.0)."

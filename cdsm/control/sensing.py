@@ -22,13 +22,12 @@ from typing import Final, NamedTuple, final
 
 import numpy as np
 
-from cdsm.errors import InvalidInput
 from cdsm.estimation.balanced_loads import Instruments
 from cdsm.estimation.estimate import TipForce, tip_force
 from cdsm.friction.capstan import ChainProblem
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.support.validation import SMALLEST, checked_quantity, scalar, whole_number
+from cdsm.support.validation import SMALLEST, checked_quantity, not_negative, scalar, whole_number
 from cdsm.support.values import Array
 
 _LARGEST_NOISE: Final = 4.0  # standard deviations at which noise is cut off
@@ -84,8 +83,7 @@ class Sensors:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not scalar("encoder", self.encoder) >= 0.0:
-            raise InvalidInput("encoder", f"{self.encoder:g} m given; 0 or more is needed.")
+        not_negative("encoder", self.encoder, "m")
         checked_quantity("tension_noise", self.tension_noise, "force", zero=True)
         scalar("tension_bias", self.tension_bias)
         whole_number("delay", self.delay, 0)
@@ -222,7 +220,7 @@ class Observer:
     @cached_property
     def _problem(self) -> ChainProblem:
         arm = self.arm
-        chains = arm.at(np.clip(0.0, arm.lower, arm.upper)).segments.chains
+        chains = arm.at(arm.body.straight).segments.chains
         return ChainProblem(arm.cables, chains.start)
 
     @cached_property

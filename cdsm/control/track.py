@@ -280,10 +280,8 @@ def _balanced_near(pose: Posture, F: Array, wrench: Array) -> tuple[Array, bool]
     torque = required_torque(pose, wrench)
     J = pose.length_jacobian
     near = F + np.linalg.lstsq(J.T, torque - F @ J)[0]
-    held = pose.arm.cables.position_controlled
-    laws = [cable.elasticity for cable in pose.arm.cables]
-    low = np.where(held, [law.low for law in laws], 0.0)
-    high = np.where(held, [law.high for law in laws], math.inf)
+    low = pose.arm.laws.low
+    high = pose.arm.laws.high
     inside = np.clip(near, low, high)
     if (inside == near).all():
         return inside, True

@@ -212,7 +212,7 @@ def _hole_table(arm: Manipulator) -> str:
 
 def cable_table(arm: Manipulator) -> str:
     """Return the text of the file ``cables.csv`` of :meth:`DesignSearch.write`."""
-    straight = arm.at(np.clip(0.0, arm.lower, arm.upper)).cable_lengths
+    straight = arm.at(arm.body.straight).cable_lengths
     shortest, longest = length_bounds(arm)
     leads = [cable.lead for cable in arm.cables]
     lengths = np.column_stack([leads, straight, shortest, longest, longest - shortest])

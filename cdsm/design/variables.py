@@ -138,11 +138,6 @@ class Variable:
         return NEWTON if self.kind == "minimum" else NUMBER
 
     @property
-    def is_continuous(self) -> bool:
-        """Whether the variable is a real number in a range."""
-        return not self.choices and self.kind not in WHOLE
-
-    @property
     def reroutes(self) -> bool:
         """Whether the variable changes the cables themselves, not a number of them."""
         return self.kind in (*WHOLE, "wire")

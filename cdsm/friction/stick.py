@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from cdsm.applied import combined, jacobian_at, load_at
+from cdsm.applied import combined, force_at, jacobian_at
 from cdsm.dead_loads import LinkPoint
 from cdsm.friction.capstan import ChainProblem, assemble_segments, can_stick
 from cdsm.loads import LoadsLike, link_point
@@ -196,8 +196,7 @@ def _first_slip(
         return np.where(can_stick(pose), abs(rise) - moved.segments.grip, -np.inf)
 
     half, T = at(load / 2.0, motion)
-    force = load / 2.0 * np.append(u, np.zeros(3))
-    wrench = combined(K.applied, load_at(point, force))
+    wrench = combined(K.applied, force_at(point, load / 2.0 * u))
     none = np.zeros(chains.hole.size, dtype=np.bool_)
     J_half = jacobian_at(half, point)[:3]
     there = assemble_segments(half, T, none, wrench, "stuck")

@@ -27,6 +27,7 @@ from cdsm.support.validation import (
     axis_vector,
     instance,
     number_array,
+    positive,
     scalar,
     unit_direction,
     vector,
@@ -314,14 +315,6 @@ def _rows(loads: list[Applied]) -> ArrayLike | list[Applied]:
 def measurement_name(i: int, label: str) -> str:
     """Return the name of measurement number ``i``: its label, or "[i]" if it has none."""
     return label or f"[{i}]"
-
-
-def positive(name: str, value: object, unit: str) -> float:
-    """Return a positive number, or raise InvalidInput with its ``unit``."""
-    number = scalar(name, value)
-    if number < SMALLEST:
-        raise InvalidInput(name, f"{number:g} {unit} given; it must be positive.")
-    return number
 
 
 def _keep(measurement: Measurement | WeightLoop, **fields: object) -> None:

@@ -11,13 +11,12 @@ import numpy as np
 from cdsm.applied import position_at
 from cdsm.dead_loads import Load
 from cdsm.errors import InvalidInput
-from cdsm.identification.measurement import positive
 from cdsm.loads import kept_loads, kept_point, link_point
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.forward_statics import forward_statics
 from cdsm.support.format import coordinates, without_rounding
-from cdsm.support.validation import NO_WRENCH, number_array, scalar
+from cdsm.support.validation import NO_WRENCH, number_array, positive, scalar
 from cdsm.support.values import Array
 
 NumbersOfCables = tuple[float, ...] | Mapping[str, float]

@@ -36,7 +36,7 @@ from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.verdict import TOLERANCE, describe_buckling
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, coordinates
-from cdsm.support.validation import RANGES, instance, one_of, scalar
+from cdsm.support.validation import RANGES, instance, not_negative, one_of
 from cdsm.support.values import Array
 from cdsm.tension import Tension
 
@@ -183,8 +183,8 @@ def mujoco_model(
     if damping is not None and damping_ratio is not None:
         raise InvalidInput("damping", "give it or damping_ratio, not both.")
     for name, value in (("damping_ratio", damping_ratio), ("damping", damping)):
-        if value is not None and scalar(name, value) < 0.0:
-            raise InvalidInput(name, f"{value:g} given; it cannot be negative.")
+        if value is not None:
+            not_negative(name, value)
 
     root = etree.Element("mujoco", model=arm.name)
     compiler = etree.SubElement(root, "compiler", angle="radian", autolimits="true")

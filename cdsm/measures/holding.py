@@ -9,7 +9,7 @@ from typing import Literal, final
 
 import numpy as np
 
-from cdsm.applied import Applied, combined, jacobian_at, load_at, scaled
+from cdsm.applied import Applied, combined, force_at, jacobian_at, scaled
 from cdsm.dead_loads import LinkPoint
 from cdsm.errors import InfeasibleTension, SingularStiffness
 from cdsm.measures.polytope import balanced
@@ -91,7 +91,7 @@ def holding_following(
     load = force or 1.0
     if math.isinf(load):
         load = _first_load(pose, low, high, wrench, u, at)
-    force_there = load_at(at, load * np.append(u, np.zeros(3)))
+    force_there = force_at(at, load * u)
     critical = critical_load(pose, force_there, low, high, wrench=wrench)
     if critical.limit == "buckling" and critical.factor * load < force:
         force = critical.factor * load
@@ -134,7 +134,7 @@ def holding_locked(
     size = _SAG * pose.arm.length * along
     if not math.isfinite(size):
         size = max(float(tension.max(initial=0.0)), 1.0)
-    force = load_at(at, size * np.append(u, np.zeros(3)))
+    force = force_at(at, size * u)
 
     def model(share: float) -> LockedArm:
         return rest.model.under(combined(wrench, scaled(force, share)))
@@ -174,10 +174,9 @@ def _holding(
 
 def _within_laws(pose: Posture, low: Array, high: Array) -> tuple[Array, Array]:
     """Narrow bounds (C,) [N] to the insides of the laws of position-controlled cables."""
-    held = pose.arm.cables.position_controlled
-    laws = [cable.elasticity for cable in pose.arm.cables]
-    first = np.where(held, [law.low * (1.0 + _INSIDE) for law in laws], 0.0)
-    last = np.where(held, [law.high * (1.0 - _INSIDE) for law in laws], math.inf)
+    laws = pose.arm.laws
+    first = laws.low * (1.0 + _INSIDE)
+    last = laws.high * (1.0 - _INSIDE)
     return frozen(np.maximum(low, first)), frozen(np.minimum(high, last))
 
 
@@ -209,7 +208,7 @@ def _limiting_bound(
     J_L y = 0 for these cables and u · J_v y = 1; then df/dF_c = (J_L y)_c of the others.
     """
     low, high = narrowed
-    added = load_at(at, (1.0 - _BELOW) * force * np.append(u, np.zeros(3)))
+    added = force_at(at, (1.0 - _BELOW) * force * u)
     load = combined(wrench, added)
     F = distribute_tension(pose, low, high, load).values
     near = _AT_BOUND * max(float(F.max(initial=0.0)), 1e-300)

@@ -295,11 +295,10 @@ def saturation(
         return stiffness(pose, distribute_tension(pose, lower, ceiling, load))
 
     distribute_tension(pose, start, ceiling, load)  # raises if minimum exceeds maximum
-    laws = [cable.elasticity for cable in arm.cables if cable.control == "position"]
-    low = max([start, *(law.low for law in laws)])
+    low = max(start, float(arm.laws.low.max()))
     at(low).require_mobile(u)
     highest = [(LARGEST_TENSION * max(float(at(low).tension.max()), 1.0), Status.OK)]
-    highest += [(law.high, Status.OUTSIDE_ELASTICITY) for law in laws]
+    highest += [(end, Status.OUTSIDE_ELASTICITY) for end in arm.laws.high.tolist()]
     own_maximum = arm.laws.narrowed(ceiling, ceiling)[1]
     highest += [(float(tension), Status.AT_MAXIMUM) for tension in own_maximum]
     high, limit = min(highest, key=lambda end: end[0])

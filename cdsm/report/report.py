@@ -112,8 +112,8 @@ def _of_limits(K: Stiffness) -> Iterator[str]:
     arm = K.posture.arm
     q = K.posture.q
     F = K.tension
-    laws = [cable.elasticity for cable in arm.cables]
-    low, high = np.array([(law.low, law.high) for law in laws]).T
+    low = arm.laws.low
+    high = arm.laws.high
     locked = arm.cables.position_controlled
     slack = F == 0.0
     cables = arm.cables.names

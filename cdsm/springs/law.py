@@ -19,6 +19,7 @@ from cdsm.support.validation import (
     checked_quantity,
     doubts_about_angle,
     number_array,
+    positive,
     scalar,
 )
 from cdsm.support.values import Array
@@ -207,9 +208,7 @@ class SpringLaw:
 
     def scaled(self, factor: float) -> SpringLaw:
         """Return the law of ``factor`` · M; InvalidInput if the factor [-] is not positive."""
-        if scalar("factor", factor) <= 0.0:
-            raise InvalidInput("factor", f"{factor:g} given; a positive number is needed.")
-        return replace(self, shape=self.shape.scaled(float(factor)))
+        return replace(self, shape=self.shape.scaled(positive("factor", factor)))
 
     def with_exponent(self, exponent: float) -> SpringLaw:
         """Return the power law with another exponent; InvalidInput for other laws."""

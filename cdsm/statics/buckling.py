@@ -207,9 +207,8 @@ def critical_tension(
     def at(minimum: float) -> Stiffness:
         return stiffness(pose, distribute_tension(pose, minimum, wrench=W))
 
-    laws = [cable.elasticity for cable in arm.cables if cable.control == "position"]
-    low = max((law.low for law in laws), default=0.0) * _ABOVE
-    ends = [*(law.high for law in laws), *(cable.maximum for cable in arm.cables)]
+    low = float(arm.laws.low.max()) * _ABOVE
+    ends = [*arm.laws.high.tolist(), *(cable.maximum for cable in arm.cables)]
     high = max(min([*ends, checked_quantity("up_to", up_to, "tension")]), low)
     at(low)  # raises the reason if no tensions balance the arm
     first = max(low, _LOWEST if high > _LOWEST else _LOWEST * high)

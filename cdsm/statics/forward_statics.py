@@ -29,7 +29,6 @@ from cdsm.support.validation import (
     NO_WRENCH,
     flag,
     instance,
-    one_of,
     scalar,
     vector,
 )
@@ -257,8 +256,7 @@ def _of_all(arm: Manipulator, name: str, value: Any) -> ArrayLike:
         "pull": np.array([-arm.length / cable.gain for cable in arm.cables]),
     }[name]
     for cable, number in value.items():
-        c = arm.cables.names.index(one_of("cable", cable, arm.cables.names))
-        numbers[c] = scalar(f"{name}[{cable!r}]", number)
+        numbers[arm.cables.number_of(cable)] = scalar(f"{name}[{cable!r}]", number)
     return numbers
 
 

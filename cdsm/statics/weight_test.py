@@ -10,7 +10,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.applied import combined, jacobian_at, load_at, position_at, scaled
+from cdsm.applied import combined, force_at, jacobian_at, position_at, scaled
 from cdsm.dead_loads import LinkPoint
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
@@ -356,8 +356,7 @@ def weight_test(
         followed = False
     states = [unloaded]
     at = link_point(pose.arm, link, point)
-    weight = np.append(force, np.zeros(3))
-    added = load_at(at, weight)
+    added = force_at(at, force)
     W = unloaded.applied
 
     def model(share: float) -> LockedArm:

@@ -54,10 +54,7 @@ def checked_tension(
     arm = instance("pose", pose, Posture).arm
     if not isinstance(tension, Tension):
         F = vector("tension", tension, len(arm.cables), "one tension [N] per cable", "tension")
-        c = int(F.argmin())
-        if F[c] < 0.0:
-            problem = f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
-            raise InvalidInput("tension", problem)
+        arm.cables.require_pulling("tension", F)
         return F, loads_of(arm, NO_WRENCH if wrench is None else wrench)
     if tension.posture is not pose:
         if not np.array_equal(tension.posture.q, pose.q):

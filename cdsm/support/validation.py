@@ -200,6 +200,22 @@ def fraction(name: str, value: object) -> float:
     return number
 
 
+def positive(name: str, value: object, unit: str = "") -> float:
+    """Return a positive number [``unit``]; raise InvalidInput for any other value."""
+    number = scalar(name, value)
+    if number < SMALLEST:
+        raise InvalidInput(name, f"{f'{number:g} {unit}'.rstrip()} given; it must be positive.")
+    return number
+
+
+def not_negative(name: str, value: object, unit: str = "") -> float:
+    """Return a number [``unit``] from 0 on; raise InvalidInput for any other value."""
+    number = scalar(name, value)
+    if number < 0.0:
+        raise InvalidInput(name, f"{f'{number:g} {unit}'.rstrip()} given; it cannot be negative.")
+    return number
+
+
 def flag(name: str, value: object) -> bool:
     """Return the value if it is True or False, else raise :class:`InvalidInput`."""
     if not isinstance(value, (bool, np.bool_)):

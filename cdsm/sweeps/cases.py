@@ -141,8 +141,7 @@ class Cases:
         self, q: Array, reached: NDArray[np.bool_], threads: int | None
     ) -> dict[str, NDArray[Any]]:
         """Compute the rows of postures that are ``reached`` (P,); the others are out of reach."""
-        start = np.clip(0.0, self.arm.lower, self.arm.upper)
-        rows = self.rows(np.where(reached[:, None], q, start), threads)
+        rows = self.rows(np.where(reached[:, None], q, self.arm.body.straight), threads)
         entries = np.repeat(reached, self.count)
         for name, values in rows.items():
             missed = ~(reached if len(values) == len(reached) else entries)

@@ -310,7 +310,7 @@ def _reach_tips(arm: Manipulator, targets: Array) -> Array:
     From the first tip that is found, each one starts at the angles of its neighbour.
     """
     angles = np.full((*targets.shape[:2], arm.nv), np.nan)
-    straight = np.clip(0.0, arm.lower, arm.upper)
+    straight = arm.body.straight
     bent = np.clip(_FIRST_BEND, arm.lower, arm.upper)
     away = np.linalg.norm(targets - arm.at(straight).tip[:3, 3], axis=-1)
     order = np.argsort(away, axis=None)[:: max(1, away.size // _FIRST_TIPS)]

@@ -10,4 +10,3 @@ from cdsm.tension.distribution import least_tension as least_tension
 from cdsm.tension.infeasibility import advice as advice
 from cdsm.tension.infeasibility import too_few_cables as too_few_cables
 from cdsm.tension.solvers import DEFAULT_SOLVER as DEFAULT_SOLVER
-from cdsm.tension.solvers import installed_solvers as installed_solvers

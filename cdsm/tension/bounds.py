@@ -13,7 +13,7 @@ from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support import validation
-from cdsm.support.validation import bound, flag, one_of
+from cdsm.support.validation import bound, flag
 from cdsm.support.values import Array, frozen
 
 _WIRE = 1.0 - 1e-9  # of the tension at which a spring leaves no wire
@@ -58,15 +58,8 @@ def bounds_at(
     if flag("worst_friction", worst_friction):
         low, high = _narrowed_by_friction(pose, low, high)
     if within_laws:
-        domains = [
-            (cable.elasticity.low, cable.elasticity.high)
-            if cable.control == "position"
-            else (0.0, math.inf)
-            for cable in arm.cables
-        ]
-        first, last = np.transpose(domains)
-        last = np.minimum(last, _WIRE * arm.laws.largest_tensions(pose.cable_lengths))
-        low = frozen(np.maximum(low, first))
+        last = np.minimum(arm.laws.high, _WIRE * arm.laws.largest_tensions(pose.cable_lengths))
+        low = frozen(np.maximum(low, arm.laws.low))
         high = frozen(np.minimum(high, last))
     if fixed:
         low, high = _fixed(arm, low, high, fixed)
@@ -130,7 +123,7 @@ def _fixed(
     low = low.copy()
     high = high.copy()
     for name, value in fixed.items():
-        c = arm.cables.names.index(one_of("cable", name, arm.cables.names))
+        c = arm.cables.number_of(name)
         low[c] = validation.checked_quantity(f"fixed[{name!r}]", value, "tension", zero=True)
         high[c] = low[c]
     return frozen(low), frozen(high)

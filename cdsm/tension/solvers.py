@@ -108,13 +108,6 @@ def nondimensional(
     return TensionProblem(A, b / force, low / force, high / force, arm, force)
 
 
-def installed_solvers() -> list[str]:
-    """Return the names of the solvers that are installed."""
-    import qpsolvers  # slow to import
-
-    return sorted(qpsolvers.available_solvers)
-
-
 def solve(problem: TensionProblem, solver: str) -> Solution:
     """Return the verified optimum x (C,) [-]; SOLVER_FAILED if the solver finds none.
 

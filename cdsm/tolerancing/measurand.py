@@ -24,7 +24,7 @@ from cdsm.routing import Indices
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import JointUnits, coordinates, largest_finite
-from cdsm.support.validation import Direction, flag, one_of, unit_direction
+from cdsm.support.validation import Direction, flag, unit_direction
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.tension import Tension, distribute_tension
 from cdsm.tolerancing.inputs import Errors, Inputs, inputs_of
@@ -191,7 +191,6 @@ def measurand_of(
     """Check the arguments of :func:`~cdsm.uncertainty`; return the measurand they describe."""
     require_name("measurand", of, "uncertainty")
     K = stiffness(pose, tension, wrench)
-    names = pose.arm.cables.names
     for name, argument in {"direction": direction, "cable": cable}.items():
         is_needed = name in QUANTITIES[of].dims
         if (argument is not None) != is_needed:
@@ -200,7 +199,7 @@ def measurand_of(
     if again and not (isinstance(tension, Tension) and tension.least):
         raise InvalidInput("tension", "is distributed again: give a least Tension.")
     u = None if direction is None else unit_direction("direction", direction)
-    index = None if cable is None else names.index(one_of("cable", cable, names))
+    index = None if cable is None else pose.arm.cables.number_of(cable)
     return Measurand(of, K, u, index, again)
 
 

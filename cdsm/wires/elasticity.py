@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.support.format import rounded
-from cdsm.support.validation import number_array, scalar
+from cdsm.support.validation import number_array, positive
 from cdsm.support.values import Array, Plotted
 
 _SHORTEST: Final = 0.5  # length of a slack wire over that at the low end of its law
@@ -101,9 +101,7 @@ class Elasticity(Plotted):
 
         Raises InvalidInput if the factor [-] is not positive.
         """
-        if scalar("factor", factor) <= 0.0:
-            raise InvalidInput("factor", f"{factor:g} given; a positive number is needed.")
-        return Elasticity(**vars(self) | {"factor": self.factor * float(factor)})
+        return Elasticity(**vars(self) | {"factor": self.factor * positive("factor", factor)})
 
     def slack_below(self) -> Elasticity:
         """Return the law continued to 0 N with the rigidity of its low end `F_0` (an assumption).

@@ -247,7 +247,10 @@ def test_bad_commands_and_assemblies_are_named() -> None:
     assembly = assembled(arm, 60.0)
     cases: list[tuple[Any, str]] = [
         (lambda: arm.assemble(other.at(HALF), np.ones(12)), "pose: is of another arm"),
-        (lambda: arm.assemble(pose, -np.ones(12)), "tension: -1 N for cable1_1; cables only pull"),
+        (
+            lambda: arm.assemble(pose, -np.ones(12)),
+            "tension: -1 N given for cable1_1; cables only pull",
+        ),
         (lambda: arm.assemble(pose, np.ones(3)), "tension: shape"),
         (
             lambda: arm.assemble(pose, cdsm.distribute_tension(arm.at(0.0 * HALF), 5.0)),
