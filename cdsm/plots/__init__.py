@@ -19,18 +19,18 @@ from cdsm.plots.bars import plot_tensions
 from cdsm.plots.curves import plot_critical_load as plot_critical_load
 from cdsm.plots.curves import plot_critical_tension as plot_critical_tension
 from cdsm.plots.curves import plot_load_history as plot_load_history
-from cdsm.plots.curves import plot_stiffness_over_tension, plot_tension_curve
 from cdsm.plots.curves import plot_weight_test as plot_weight_test
+from cdsm.plots.laws import plot_elasticity as plot_elasticity
+from cdsm.plots.laws import plot_spring_fit as plot_spring_fit
+from cdsm.plots.laws import plot_tensile_fit as plot_tensile_fit
 from cdsm.plots.loads import plot_load_estimate as plot_load_estimate
 from cdsm.plots.maps import plot_map
 from cdsm.plots.measured import plot_designs as plot_designs
-from cdsm.plots.measured import plot_elasticity as plot_elasticity
 from cdsm.plots.measured import plot_experiment_plan as plot_experiment_plan
 from cdsm.plots.measured import plot_identification as plot_identification
 from cdsm.plots.measured import plot_monte_carlo as plot_monte_carlo
-from cdsm.plots.measured import plot_spring_fit as plot_spring_fit
-from cdsm.plots.measured import plot_tensile_fit as plot_tensile_fit
 from cdsm.plots.measured import plot_uncertainty as plot_uncertainty
+from cdsm.plots.over_tension import plot_stiffness_over_tension, plot_tension_curve
 from cdsm.plots.page import draw_report as draw_report
 from cdsm.plots.paper import plot_paper as plot_paper
 from cdsm.plots.paths import plot_force_polytope as plot_force_polytope

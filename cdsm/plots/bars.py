@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -63,7 +63,7 @@ def plot_shares(shares: Shares, ax: Axes | None = None, *, title: str | None = N
     direction = style.direction_name(shares.direction)
     panel.set_xlabel(f"contribution [{unit}] to {total:.4g} {unit} along {direction}")
     # to the left, where names of cables leave room
-    panel.legend(loc="upper right", bbox_to_anchor=(1.0, -0.42 / style.height_of(panel)), ncols=2)
+    _legend_below(panel, "right")
     style.set_title(panel, title, f"{arm.name}: what makes it stiff?", shares.is_stable)
     return panel
 
@@ -207,8 +207,14 @@ def _bounds(panel: Axes, y: Array, tension: Tension) -> None:
             look: dict[str, Any] = {"color": style.VERMILLION, "ms": 6, "mew": 1.1, "zorder": 3}
             panel.plot(bound[shown], y[shown], "|", label=words, gid=f"bound:{name}", **look)
     if panel.get_legend_handles_labels()[1]:
-        anchor = (0.0, -0.42 / style.height_of(panel))
-        panel.legend(loc="upper left", bbox_to_anchor=anchor, ncols=2)
+        _legend_below(panel, "left")
+
+
+def _legend_below(panel: Axes, side: Literal["left", "right"]) -> None:
+    """Put the legend below the label of the x-axis, at one side."""
+    anchor = (float(side == "right"), -0.42 / style.height_of(panel))
+    look: dict[str, Any] = {"loc": f"upper {side}", "bbox_to_anchor": anchor, "ncols": 2}
+    panel.legend(**look)
 
 
 def _marks(panel: Axes, y: Array, attainable: StiffnessRange) -> float:
@@ -221,6 +227,5 @@ def _marks(panel: Axes, y: Array, attainable: StiffnessRange) -> float:
         look: dict[str, Any] = {"color": color, "mfc": "white", "mew": 1.0, "ms": 4.5, "zorder": 4}
         words = f"{name}: {stiffness_text(value)}"
         panel.plot(tension.values, y, marker, ls="", label=words, gid=name, **look)
-    anchor = (0.0, -0.42 / style.height_of(panel))
-    panel.legend(loc="upper left", bbox_to_anchor=anchor, ncols=2)
+    _legend_below(panel, "left")
     return float(max(attainable.low_tension.values.max(), attainable.high_tension.values.max()))

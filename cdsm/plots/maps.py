@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 import textwrap
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 import numpy as np
 from matplotlib import colormaps
@@ -18,53 +16,36 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
-from cdsm.errors import InvalidInput
 from cdsm.plots import style
-from cdsm.plots.style import MM, Panels
+from cdsm.plots.map_cells import (
+    FAULTS,
+    HUGE,
+    OTHER,
+    Cells,
+    Statistic,
+    entries_of,
+    grid_cells,
+    is_grid,
+    is_line,
+    quantity_of,
+    tip_cells,
+    unit_of_axis,
+)
+from cdsm.plots.style import Panels
 from cdsm.quantities import display_of, si_of
 from cdsm.status import Status
 from cdsm.support.format import one_unit
 from cdsm.support.status import check_sweep, status_names
-from cdsm.support.validation import XYZ, one_of, scalar
+from cdsm.support.validation import one_of
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     import xarray
 
-Statistic = Literal["median", "min", "max"]
 
-_MOST_PANELS = 9
-_POSTURES = 8  # per cell of a slice, from which the size of its cells follows
-_CELLS = (6, 40)  # least and largest number of cells along the longest side of a slice
 _WIDE = 8.0  # the colours are logarithmic if the ratio of largest to smallest value exceeds this
 _ROBUST: Final = (1.0, 99.0)  # percentiles at the ends of the colours
-_FLAT = 1e-9  # tips are in a plane if an extent is below this part of the largest
-_SLICE = 0.04  # half thickness of the slices of a cloud of tips, divided by its extent
-_HUGE = 1e300
-_EDGE = 1e-6  # of a cell, so that tips at the last edge are inside
-
-_FAULTS: Final = {
-    Status.UNSTABLE: ("unstable", "#fbe3d6", "//////", style.VERMILLION),
-    Status.INFEASIBLE: ("no balance", "0.94", "......", "0.55"),
-    Status.OUTSIDE_ELASTICITY: ("beyond the wire", "#e6eef6", "xxxxxx", style.SKY),
-    Status.OUT_OF_REACH: ("out of reach", "0.97", "", "0.97"),
-}
-"""Words, colour, hatch and its colour of cells without a value, by the status of their entries."""
-
-_OTHER: Final = ("no value", "0.9", "\\\\\\\\", "0.6")
-
-
-class Cells(NamedTuple):
-    """A panel of a map: edges of its cells, a value in each, and why some have none."""
-
-    title: str
-    x: Array  # edges (m + 1,)
-    y: Array  # edges (n + 1,)
-    values: Array  # (n, m), NaN where none is
-    faults: dict[str, NDArray[np.bool_]]  # where no value is (n, m), by words
-    labels: tuple[str, str]  # of the two axes
-    scale: str  # panels of one scale share their colours
-    heading: str = ""  # in words, how many postures are inside
+_EVEN = 1e-9  # a smaller difference of the ends of the colours, over the largest, is rounding
 
 
 @style.styled
@@ -117,18 +98,18 @@ def plot_map(
     """
     check_sweep(dataset)
     one_of("statistic", statistic, get_args(Statistic))
-    value, poses, cases = _value(dataset, quantity)
+    value, poses, cases = quantity_of(dataset, quantity)
     name = _words_of_along(dataset) if quantity == "along" else str(value.long_name).split(",")[0]
     unit, _ = display_of(si_of(value.units))
     label = f"{name} [{one_unit(unit) or '-'}]"
-    if len(poses) == 1 and section is None and _is_line(dataset, poses[0]):
+    if len(poses) == 1 and section is None and is_line(dataset, poses[0]):
         return _plot_lines(dataset, value, poses[0], cases, label, axs, title)
-    if section is None and _is_grid(dataset, poses):
-        panels = list(_grid_cells(dataset, value, poses, cases))
+    if section is None and is_grid(dataset, poses):
+        panels = list(grid_cells(dataset, value, poses, cases))
     else:
         remedy = "tip_position must be among outputs of the sweep."
         one_of("quantity", "tip_position", [str(v) for v in dataset.data_vars], remedy)
-        panels = list(_tip_cells(dataset, value, poses, cases, section, statistic))
+        panels = list(tip_cells(dataset, value, poses, cases, section, statistic))
         label += f"\n{statistic} of the postures in a cell"
     return _plot_cells(dataset, panels, label, axs, title)
 
@@ -137,239 +118,6 @@ def _words_of_along(dataset: xarray.Dataset) -> str:
     """Return the words of ``along``, with its direction if that is the only one left."""
     alone = "direction" in dataset.coords and not dataset["direction"].ndim
     return f"stiffness along {dataset['direction'].item()}" if alone else "stiffness"
-
-
-def _value(dataset: xarray.Dataset, quantity: str) -> tuple[xarray.DataArray, list[str], list[str]]:
-    """Return the quantity of a sweep, the dimensions of its postures, and those of its cases."""
-    remedy = "the quantity must be among outputs of the sweep."
-    one_of("quantity", quantity, [str(variable) for variable in dataset.data_vars], remedy)
-    value = dataset[quantity]
-    dims = [str(dim) for dim in value.dims]
-    poses = [str(dim) for dim in dataset["status"].dims if dim not in ("wrench", "minimum")]
-    allowed = {*map(str, dataset["status"].dims), "direction"}
-    if quantity == "status" or not {*poses} <= {*dims} <= allowed:
-        raise InvalidInput(
-            "quantity",
-            f"{quantity} has the dimensions {', '.join(dims)}; a map shows one number per entry, "
-            "such as softest, stiffest, isotropy, margin or along.",
-        )
-    cases = [dim for dim in dims if dim not in poses]
-    count = math.prod(dataset.sizes[dim] for dim in cases)
-    if count > _MOST_PANELS:
-        listed = ", ".join(f"{dim} ({dataset.sizes[dim]})" for dim in cases)
-        raise InvalidInput(
-            "dataset",
-            f"makes {count} panels, of {listed}; choose up to {_MOST_PANELS}, as in "
-            f"dataset.isel({cases[0]}=[0]).",
-        )
-    return value, poses, cases
-
-
-def _is_grid(dataset: xarray.Dataset, poses: list[str]) -> bool:
-    """Whether postures are a grid of two evenly numbered coordinates."""
-    return len(poses) == 2 and all(
-        dim in dataset.coords and dataset.sizes[dim] > 1 and dataset[dim].dtype.kind == "f"
-        for dim in poses
-    )
-
-
-def _is_line(dataset: xarray.Dataset, dim: str) -> bool:
-    return "distance" in dataset.coords or (dim != "pose" and dataset.sizes[dim] > 1)
-
-
-def _entries(
-    dataset: xarray.Dataset, value: xarray.DataArray, poses: list[str], cases: list[str]
-) -> tuple[list[dict[str, str]], Array, NDArray[np.int_]]:
-    """Return words of each case, values (cases, …poses) for people, and statuses of that shape."""
-    names: list[dict[str, str]] = []
-    labels = [[(dim, _name(x)) for x in dataset[dim]] for dim in cases]
-    for case in itertools.product(*labels):
-        names.append(dict(case))
-    status = dataset["status"]
-    # a dimension that the quantity does not have cannot change its status: take index 0
-    dims = [*map(str, value.dims)]
-    status = status.isel({dim: 0 for dim in status.dims if dim not in dims}, drop=True)
-    status = status.broadcast_like(value)
-    shape = (len(names), *(dataset.sizes[dim] for dim in poses))
-    x, code = (a.transpose(*cases, *poses).values.reshape(shape) for a in (value, status))
-    _, size = display_of(si_of(value.units))
-    x = x / size
-    words = status_names(dataset)
-    codes = {word: k for k, word in words.items()}
-    if value.name != "margin":
-        x = np.where(code == codes[Status.UNSTABLE.word], np.nan, x)
-    numbers = {k: Status[word.upper()] for k, word in words.items()}
-    return names, x, np.vectorize(lambda k: int(numbers[int(k)]))(code)
-
-
-def _name(coordinate: xarray.DataArray) -> str:
-    """Write a coordinate of a case: ``minimum 20 N``, ``along z``."""
-    value = coordinate.item()
-    unit = coordinate.attrs.get("units", "1")
-    text = value if isinstance(value, str) else f"{value:g}"
-    words = {"direction": "along", "minimum": "tensions from"}.get(
-        str(coordinate.name), str(coordinate.name)
-    )
-    return f"{words} {text}{'' if unit == '1' else f' {unit}'}"
-
-
-def _faults_of(values: Array, status: NDArray[np.int_]) -> dict[str, NDArray[np.bool_]]:
-    """Return where no value is, by the words for its status."""
-    missing = np.isnan(values)
-    faults: dict[str, NDArray[np.bool_]] = {}
-    for code in np.unique(status[missing]).tolist():
-        words = _FAULTS.get(Status(code), _OTHER)[0]
-        mask = missing & (status == code)
-        faults[words] = mask | faults[words] if words in faults else mask
-    return faults
-
-
-def _grid_cells(
-    dataset: xarray.Dataset, value: xarray.DataArray, poses: list[str], cases: list[str]
-) -> Iterator[Cells]:
-    """Yield the cells of a grid over two joints, or of tips in a plane."""
-    names, x, status = _entries(dataset, value, poses, cases)
-    first, second = (_axis(dataset, dim) for dim in poses)
-    for case, values, code in zip(names, x, status, strict=True):
-        cells = values.T
-        yield Cells(
-            ", ".join(case.values()), first[1], second[1], cells, _faults_of(cells, code.T),
-            (first[0], second[0]), case.get("direction", ""),
-        )  # fmt: skip
-
-
-def _axis(dataset: xarray.Dataset, dim: str) -> tuple[str, Array]:
-    """Return the label of a coordinate of cells, and the edges of its cells."""
-    coordinate = dataset[dim]
-    unit, size = {"rad": ("°", math.pi / 180.0), "m": ("mm", 1e-3)}.get(
-        coordinate.attrs.get("units", "1"), ("-", 1.0)
-    )
-    middle = coordinate.values / size
-    step = np.diff(middle)
-    edges = np.concatenate(
-        [[middle[0] - step[0] / 2], middle[:-1] + step / 2, [middle[-1] + step[-1] / 2]]
-    )
-    name = dim.removeprefix("tip_") if "plane" in dataset.coords else dim
-    return f"{name} [{unit}]", edges
-
-
-def _tip_cells(
-    dataset: xarray.Dataset,
-    value: xarray.DataArray,
-    poses: list[str],
-    cases: list[str],
-    section: Any,
-    statistic: Statistic,
-) -> Iterator[Cells]:
-    """Yield the cells of tips in a plane, in a section, or of a cloud in three slices."""
-    names, x, status = _entries(dataset, value, poses, cases)
-    tips = MM * dataset["tip_position"].transpose(*poses, "axis").values.reshape(-1, 3)
-    known = np.isfinite(tips).all(axis=1)
-    tips = tips[known]
-    x = x.reshape(len(names), -1)[:, known]
-    status = status.reshape(len(names), -1)[:, known]
-    views = list(_views(tips, section))
-    if not any(inside.any() for _, _, inside in views):
-        problem = "has no tip to show; widen the section, or sweep over other postures."
-        raise InvalidInput("section" if section is not None else "dataset", problem)
-    for case, values, code in zip(names, x, status, strict=True):
-        for view, normal, inside in views:
-            plane = [axis for axis in range(3) if axis != normal]
-            points = tips[inside][:, plane]
-            edges = _edges(points)
-            cells = bin_values(points, values[inside], edges, statistic)
-            faults = _binned_faults(points, values[inside], code[inside], edges, cells)
-            holds = int(np.isfinite(values[inside]).sum())
-            heading = f"{holds} of {inside.sum()} postures hold"
-            labels = (f"{XYZ[plane[0]]} [mm]", f"{XYZ[plane[1]]} [mm]")
-            title = ", ".join(filter(None, (*case.values(), view)))
-            shared = case.get("direction", "")
-            yield Cells(title, *edges, cells, faults, labels, shared, heading)
-
-
-def _views(points: Array, section: Any) -> Iterator[tuple[str, int, NDArray[np.bool_]]]:
-    """Yield the view of a section or of the plane of all tips, or else three slices."""
-
-    def slab(axis: int, middle: float, half: float) -> tuple[str, int, NDArray[np.bool_]]:
-        title = f"{XYZ[axis]} = {round(middle, 1) + 0.0:.3g} ± {half:.2g} mm"
-        inside = abs(points[:, axis] - middle) <= half
-        return title.replace(" ", "\xa0"), axis, inside  # no line break
-
-    every = np.full(len(points), True)
-    extent = np.ptp(np.vstack([points, np.zeros(3)]), axis=0)
-    flat = np.ptp(points, axis=0) <= _FLAT * extent.max() if len(points) else np.zeros(3, bool)
-    if section is not None:
-        if not isinstance(section, (tuple, list)) or len(section) != 3:
-            problem = f"{section!r} given; an axis, its place and the half thickness [m] needed."
-            raise InvalidInput("section", problem)
-        axis = XYZ.index(one_of("axis", section[0], XYZ))
-        yield slab(axis, *(MM * scalar("section", number) for number in section[1:]))
-    elif flat.any():
-        axis = int(np.where(flat, extent, np.inf).argmin())
-        off = extent[axis] > _FLAT * extent.max()  # from the base, which is at the origin
-        title = f"{XYZ[axis]} = {points[0, axis]:.3g} mm".replace(" ", "\xa0")
-        yield title if off else "", axis, every
-    else:
-        for axis in (1, 2, 0):
-            middle = float(np.median(points[:, axis])) if len(points) else 0.0
-            half = _SLICE * float(np.ptp(points[:, axis])) if len(points) else 0.0
-            yield slab(axis, middle, half)
-
-
-def _edges(points: Array) -> tuple[Array, Array]:
-    """Return edges of square cells around points (N, 2), of a size that follows from N."""
-    if not len(points):
-        return np.array([0.0, 1.0]), np.array([0.0, 1.0])
-    extent = np.ptp(points, axis=0)
-    longest = float(extent.max()) or 1.0
-    area = float(np.prod(np.maximum(extent, 1e-3 * longest)))
-    size = math.sqrt(area * _POSTURES / len(points))
-    size = float(np.clip(size, longest / _CELLS[1], longest / _CELLS[0])) * (1.0 + _EDGE)
-    count = np.maximum(np.ceil(extent / size - _EDGE), 1.0).astype(int)
-    low = points.min(axis=0) + extent / 2.0 - size * count / 2.0
-    x, y = (low[i] + size * np.arange(count[i] + 1) for i in range(2))
-    return x, y
-
-
-def bin_values(
-    points: Array,
-    values: Array,
-    edges: tuple[Array, Array],
-    statistic: Statistic | Literal["count"],
-) -> Array:
-    """Return a statistic (n, m) of values (N,) at points (N, 2) in cells; NaN where there is none.
-
-    Infinite values count as the largest.
-    """
-    from scipy.stats import binned_statistic_2d  # here, because it imports slowly
-
-    x, y = edges
-    known = ~np.isnan(values)
-    cells = np.full((len(x) - 1, len(y) - 1), 0.0 if statistic == "count" else np.nan)
-    if known.any():
-        finite = np.minimum(values[known], _HUGE)
-        cells = binned_statistic_2d(*points[known].T, finite, statistic, [x, y]).statistic
-    return np.asarray(np.where(cells >= _HUGE / 2.0, np.inf, cells)).T
-
-
-def _binned_faults(
-    points: Array,
-    values: Array,
-    status: NDArray[np.int_],
-    edges: tuple[Array, Array],
-    cells: Array,
-) -> dict[str, NDArray[np.bool_]]:
-    """Return the cells without a value, each by the words for most of its entries."""
-    faults = _faults_of(values, status)
-    if not faults:
-        return {}
-    zeros = np.zeros(len(points))
-    counts = np.array(
-        [bin_values(points[mask], zeros[mask], edges, "count") for mask in faults.values()]
-    )
-    empty = np.isnan(cells) & (counts.max(axis=0) > 0)
-    most = counts.argmax(axis=0)
-    return {words: empty & (most == k) for k, words in enumerate(faults)}
 
 
 def _plot_cells(
@@ -449,7 +197,7 @@ def _colors(arrays: Sequence[Array]) -> tuple[ScalarMappable, str]:
         low = -high
     elif low > 0.0 and high > _WIDE * low:
         scale = LogNorm
-    if high - low <= _FLAT * abs(high):  # differences are rounding
+    if high - low <= _EVEN * abs(high):  # differences are rounding
         low = low - 0.05 * abs(low)
         high = high + 0.05 * abs(high)
     beyond = bool((finite < low).any()), bool((values > high).any())
@@ -458,7 +206,7 @@ def _colors(arrays: Sequence[Array]) -> tuple[ScalarMappable, str]:
 
 
 def _draw(ax: Axes, panel: Cells, colors: ScalarMappable) -> None:
-    values = np.ma.masked_invalid(np.minimum(panel.values, _HUGE))
+    values = np.ma.masked_invalid(np.minimum(panel.values, HUGE))
     look: dict[str, Any] = {"norm": colors.norm, "cmap": colors.cmap, "rasterized": True}
     ax.pcolormesh(panel.x, panel.y, values, gid="cells", zorder=1, **look)
     for words, mask in panel.faults.items():
@@ -498,7 +246,7 @@ def _hatch(ax: Axes, panel: Cells, words: str, mask: NDArray[np.bool_]) -> None:
 
 
 def _look_of(words: str) -> tuple[str, str, str, str]:
-    return next((look for look in _FAULTS.values() if look[0] == words), _OTHER)
+    return next((look for look in FAULTS.values() if look[0] == words), OTHER)
 
 
 def _quantiles(values: Array) -> str:
@@ -541,7 +289,7 @@ def color_bar_below(axs: Sequence[Axes], colors: ScalarMappable, label: str, ext
 def _legend_faults(panels: Panels, cells: list[Cells], axs_of_caller: object) -> None:
     """Draw what the hatches mean: below a figure of this library, else beside the last panel."""
     used = {words for panel in cells for words, mask in panel.faults.items() if mask.any()}
-    looks = [look for look in (*_FAULTS.values(), _OTHER) if look[0] in used]
+    looks = [look for look in (*FAULTS.values(), OTHER) if look[0] in used]
     keys = []
     for words, face, hatch, edge in looks:
         line: dict[str, Any] = {"ec": edge, "lw": 0.0} if hatch else {"ec": "0.8", "lw": 0.5}
@@ -567,11 +315,9 @@ def _plot_lines(
     title: str | None,
 ) -> Panels:
     """Draw a quantity over one joint, or over the way along a path, with a line for each case."""
-    names, x, _ = _entries(dataset, value, [dim], cases)
+    names, x, _ = entries_of(dataset, value, [dim], cases)
     coordinate = dataset["distance" if "distance" in dataset.coords else dim]
-    unit, size = {"rad": ("°", math.pi / 180.0), "m": ("mm", 1e-3)}.get(
-        coordinate.attrs.get("units", "1"), ("-", 1.0)
-    )
+    unit, size = unit_of_axis(coordinate)
     panels = style.panels(axs, 1, height=2.4, width=style.ONE_COLUMN)
     ax = panels[0]
     place = coordinate.values / size

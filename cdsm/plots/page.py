@@ -23,8 +23,8 @@ from cdsm.planning.sensitivity import saturation
 from cdsm.plots import style
 from cdsm.plots.arm import plot_arm
 from cdsm.plots.bars import plot_shares, plot_tensions
-from cdsm.plots.curves import plot_stiffness_over_tension
 from cdsm.plots.measured import plot_uncertainty
+from cdsm.plots.over_tension import plot_stiffness_over_tension
 from cdsm.plots.style import MM, N_PER_MM
 from cdsm.quantities import display_for
 from cdsm.stiffness_matrix import prints

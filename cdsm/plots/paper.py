@@ -17,7 +17,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from cdsm.plots import style
 from cdsm.plots.arm import draw_arm
-from cdsm.plots.measured import shade_stages
+from cdsm.plots.laws import shade_stages
 from cdsm.plots.projection import VIEW, Drawing
 from cdsm.plots.style import KN, MM, N_PER_MM, Panels
 from cdsm.support.values import Array

@@ -131,8 +131,7 @@ def plot_path_plan(
     style.cable_lines(below, x, tensions, plan.arm.cables.names, **line)
     for ax in panels:
         for i in (sample.index for sample in plan.infeasible):
-            look: dict[str, Any] = {"fc": "#fbe3d6", "ec": style.VERMILLION, "hatch": "////"}
-            ax.axvspan(i - 0.5, i + 0.5, linewidth=0.0, zorder=0.4, gid="infeasible", **look)
+            ax.axvspan(i - 0.5, i + 0.5, gid="infeasible", **style.HATCHED)
     above.set_ylabel(f"stiffness [{unit}]")
     above.legend(loc="lower right")
     style.whole_numbers(below.xaxis)

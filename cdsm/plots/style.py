@@ -80,6 +80,21 @@ STYLE: Final = Path(__file__).with_name("cdsm.mplstyle")
 """Style sheet of all pictures; ``plt.style.use(cdsm.plots.STYLE)`` takes it for pictures of one's
 own."""
 
+UNHELD: Final = "#fbe3d6"
+"""Colour of what an arm does not hold, below the hatch."""
+
+HATCHED: Final[dict[str, Any]] = {
+    "fc": UNHELD,
+    "ec": VERMILLION,
+    "hatch": "////",
+    "lw": 0.0,
+    "zorder": 0.4,
+}
+"""Look of a range in which the arm does not hold."""
+
+AROUND: Final = 0.08
+"""Room above and below the values of a curve, over their range."""
+
 NOTE_SIZE: Final = 6.5
 """Size of small text [points]."""
 

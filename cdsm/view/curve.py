@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, final
 import numpy as np
 
 from cdsm.loads import LoadsLike
-from cdsm.plots.curves import TensionLevel, at_level
+from cdsm.plots.over_tension import TensionLevel, at_level
 from cdsm.plots.style import BLUE, VERMILLION
 from cdsm.quantities import display_for
 from cdsm.support.format import largest_finite

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 import cdsm
 from cdsm import plots
-from cdsm.plots import maps
-from cdsm.plots.maps import Cells
+from cdsm.plots import map_cells, maps
+from cdsm.plots.map_cells import Cells
 from tests.support.pictures import artists, line, named, require_look, words
 from tests.support.printed import numbers
 from tests.support.sweeps import short_arm
@@ -103,9 +103,9 @@ def test_bins_are_medians_by_hand() -> None:
     points = np.array([[0.5, 0.5], [0.6, 0.4], [0.7, 0.1], [2.5, 1.5], [1.5, 0.5]])
     values = np.array([1.0, 9.0, 2.0, np.inf, 4.0])
     edges = np.arange(4.0), np.arange(3.0)
-    binned = maps.bin_values(points, values, edges, "median")
+    binned = map_cells.bin_values(points, values, edges, "median")
     np.testing.assert_array_equal(binned, [[2.0, 4.0, np.nan], [np.nan, np.nan, np.inf]])
-    assert maps.bin_values(points, values, edges, "max")[0, 0] == 9.0
+    assert map_cells.bin_values(points, values, edges, "max")[0, 0] == 9.0
 
 
 def test_a_cell_without_a_value_has_the_hatch_of_most_of_its_postures() -> None:
@@ -114,18 +114,18 @@ def test_a_cell_without_a_value_has_the_hatch_of_most_of_its_postures() -> None:
     status = np.array([unstable, lost, unstable, lost, lost, unstable, 0])
     values = np.where(status == 0, 1.0, np.nan)
     edges = np.arange(3.0), np.arange(2.0)
-    cells = maps.bin_values(points, values, edges, "median")
-    faults = maps._binned_faults(points, values, status, edges, cells)
+    cells = map_cells.bin_values(points, values, edges, "median")
+    faults = map_cells._binned_faults(points, values, status, edges, cells)
     assert {words: mask.tolist() for words, mask in faults.items()} == {
         "unstable": [[True, False]],
         "no balance": [[False, False]],  # the other cell has a value
     }
-    faults = maps._binned_faults(points[:6], values[:6], status[:6], edges, cells * np.nan)
+    faults = map_cells._binned_faults(points[:6], values[:6], status[:6], edges, cells * np.nan)
     assert faults["no balance"].tolist() == [[False, True]]
 
 
 def test_reasons_for_no_value_are_told_apart_by_their_hatches() -> None:
-    looks = [*maps._FAULTS.values(), maps._OTHER]
+    looks = [*map_cells.FAULTS.values(), map_cells.OTHER]
     for part in zip(*((face, hatch) for _, face, hatch, _ in looks), strict=True):
         assert len({*part}) == len(looks)
 

@@ -15,7 +15,7 @@ import cdsm
 from cdsm import plots, track
 from cdsm.identification import Identification, WeightLoop, identify
 from cdsm.planning.path_plan import PathPlan
-from cdsm.plots.measured import shade_stages
+from cdsm.plots.laws import shade_stages
 from cdsm.support.values import Plotted
 from tests.design import test_problem as designs
 from tests.identification import test_experiment as experiment
