@@ -268,14 +268,11 @@ def read_path(path: Path, arm: cdsm.Manipulator, *, target: bool = True) -> Moti
     """
     import numpy as np
 
-    from cdsm.joints import require_followers
-    from cdsm.support.tables import ANGLE, Columns
+    from cdsm.joint_columns import JointColumns
+    from cdsm.support.tables import SLIDE, Columns
 
-    length = {"mm": 1e-3, "m": 1.0}
-    pairs = zip(arm.joint_names, arm.slides, strict=True)
-    units = {name: length if slides else ANGLE for name, slides in pairs}
-    followers = [name for name in arm.body.all_joints if name not in units]
-    units |= dict.fromkeys(followers, ANGLE | length) | dict.fromkeys("xyz", length)
+    joints = JointColumns(arm)
+    units = joints.units | dict.fromkeys("xyz", SLIDE)
     if target:
         units |= {"target": {"N/mm": 1e3, "N/m": 1.0}}
     # a closed loop writes the displacement of its samples
@@ -286,19 +283,16 @@ def read_path(path: Path, arm: cdsm.Manipulator, *, target: bool = True) -> Moti
 
     has_tips = any(axis in table for axis in "xyz")
     if has_tips == any(name in table for name in arm.joint_names):
-        first = f"{arm.joint_names[0]} [{'mm' if arm.slides[0] else 'deg'}]"
+        which = "both" if has_tips else "neither"
         table.refuse(
-            f"has columns for {'both' if has_tips else 'neither'} of joint angles ({first}, …) and "
-            "tip positions (x [mm], y [mm], z [mm]); give one of them"
+            f"has columns for {which} of joint angles ({joints.first}, …) and tip positions "
+            "(x [mm], y [mm], z [mm]); give one of them"
         )
     wanted = column("target") if "target" in table else None
     if has_tips:
         return Motion(tips=np.transpose([column(name) for name in "xyz"]), target=wanted)
-    rest = np.zeros(len(table.rows))
-    angles = np.transpose([column(name) if name in table else rest for name in arm.joint_names])
-    logged = {name: column(name) for name in followers if name in table}
     try:
-        require_followers(arm.body.coupling, arm.body.all_joints, angles, logged)
+        angles = joints.angles(table, table.rows)
     except cdsm.InvalidInput as error:
         raise cdsm.FileError(path, str(error)) from None
     return Motion(angles=angles, target=wanted)

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import os
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cdsm.errors import FileError, InvalidInput
-from cdsm.joints import require_followers
+from cdsm.joint_columns import JointColumns
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.support.tables import ANGLE, Columns
+from cdsm.support.tables import FORCE, TEXT, Columns
 from cdsm.support.validation import instance
 from cdsm.support.values import Array, frozen
-
-_LENGTH: Final = {"mm": 1e-3, "m": 1.0}
-_FORCE: Final = {"N": 1.0}
-_TEXT: Final[dict[str, float]] = {}
 
 
 class LoadCellReading(NamedTuple):
@@ -46,26 +42,18 @@ def read_load_cells(path: str | os.PathLike[str], arm: Manipulator) -> tuple[Loa
         FileError: The file cannot be read, a column is missing or has no unit, or an entry is
             wrong; the line and the column are named.
     """
-    joints = instance("arm", arm, Manipulator).joint_names
+    joints = JointColumns(instance("arm", arm, Manipulator))
     cables = arm.cables.names
-    pairs = zip(joints, arm.slides, strict=True)
-    units = {"label": _TEXT} | dict.fromkeys(cables, _FORCE)
-    units |= {name: _LENGTH if slides else ANGLE for name, slides in pairs}
-    followers = [name for name in arm.body.all_joints if name not in joints]
-    units |= dict.fromkeys(followers, ANGLE | _LENGTH)
+    units = {"label": TEXT} | dict.fromkeys(cables, FORCE) | joints.units
     table = Columns(path, units, "readings")
     for name in cables:
         table.factor(name)
-    if not any(name in table for name in joints):
-        unit = "mm" if arm.slides[0] else "deg"
-        table.refuse(f"has no angle; give a column for each joint, such as {joints[0]} [{unit}]")
+    if not any(name in table for name in arm.joint_names):
+        table.refuse(f"has no angle; give a column for each joint, such as {joints.first}")
     readings = []
     for row in table.rows:
-        q = [table.number(row, name) if name in table else 0.0 for name in joints]
-        logged = {name: np.array([table.number(row, name)]) for name in followers if name in table}
         try:
-            require_followers(arm.body.coupling, arm.body.all_joints, np.array([q]), logged)
-            pose = arm.at(q, check_limits=False)
+            pose = arm.at(joints.angles(table, [row])[0], check_limits=False)
         except InvalidInput as error:
             raise FileError(path, f"line {row[0]}: {error}") from None
         F = frozen(np.array([table.number(row, name) for name in cables]))

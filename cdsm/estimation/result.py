@@ -16,7 +16,7 @@ from cdsm.errors import listed
 from cdsm.estimation.components import Components
 from cdsm.load_texts import texts
 from cdsm.posture import Posture
-from cdsm.support.determination import Determination, chi_square_text, likely
+from cdsm.support.determination import INTERVAL, Determination, chi_square_text, likely
 from cdsm.support.format import aligned, coordinates, plural, span, with_uncertainty
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import SMALLEST
@@ -26,7 +26,6 @@ _WIDE = 3.0  # times the instruments by which friction is named in a warning
 _LARGE = 0.5  # Σ μ β of a cable from which on first order misleads
 _CORRELATED = 0.9  # correlation of two loads that is printed
 _SHOWN = 0.05  # part of the largest coefficient of a combination below which one is not printed
-_HALF = 1.96  # half width of an interval of 95 % in standard deviations
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -290,7 +289,7 @@ class LoadEstimate(TensionEstimate, Plotted):
                 shown = [value, f"{self.band[i]:.2g}", f"{self.uncertainty[i]:.2g}"]
             rows.append((f"{name} [{unit_name}]", *shown))
         note = "(std: load cells and angles. friction: most that holes of unknown direction hide. "
-        note += f"Within ± (friction + {_HALF:g} std) in 95 % of all cases or more)"
+        note += f"Within ± (friction + {INTERVAL:g} std) in 95 % of all cases or more)"
         seen: list[Sequence[str]] = [("combination, told best first", "std", "friction ±")]
         for row, std, band in zip(self.seen, self.seen_std, self.seen_band, strict=True):
             numbers = (f"{std:.2g} N", f"{band:.2g} N") if std < math.inf else ("not told", "")

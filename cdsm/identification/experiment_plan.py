@@ -14,7 +14,7 @@ from cdsm.errors import InvalidInput
 from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.measurement import WeightLoop
 from cdsm.manipulator import Manipulator
-from cdsm.support.determination import Determination
+from cdsm.support.determination import Determination, interval_in_percent
 from cdsm.support.format import aligned, coordinates
 from cdsm.support.progress import show_progress
 from cdsm.support.result import Result, quantity, unit
@@ -91,7 +91,7 @@ class ExperimentPlan(Result, Plotted):
     def __str__(self) -> str:
         times = ((label, f"{count}×") for label, count in self.repetitions.items())
         rows = aligned([("test", "times"), *times])
-        shares = 196.0 * self.std / abs(self.values)
+        shares = interval_in_percent(self.std, self.values)
         cells = list[tuple[str, ...]]()
         for name, x, share in zip(self.names, self.values, shares, strict=True):
             interval = "not determined" if math.isinf(share) else f"± {share:.3g} %"

@@ -13,16 +13,14 @@ from cdsm.dead_loads import Load
 from cdsm.errors import FileError, InvalidInput
 from cdsm.identification.measurement import WeightLoop
 from cdsm.identification.tip_position import TipPosition
-from cdsm.joints import require_followers
+from cdsm.joint_columns import JointColumns
 from cdsm.loads import link_point
 from cdsm.manipulator import Manipulator
-from cdsm.support.tables import ANGLE, Columns, Row
+from cdsm.support.tables import FORCE, TEXT, Columns, Row
 from cdsm.support.validation import AXES, instance
 
 _LENGTH: Final = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
-_FORCE: Final = {"N": 1.0}
 _MASS: Final = {"kg": 1.0, "g": 1e-3}
-_TEXT: Final[dict[str, float]] = {}
 
 
 def read_loops(
@@ -71,13 +69,11 @@ def read_loops(
         >>> len(loops), loops[0].label
         (2, 'down')
     """
-    joints = instance("arm", arm, Manipulator).joint_names
+    joints = JointColumns(instance("arm", arm, Manipulator))
     cables = arm.cables.names
-    units = {"test": _TEXT, "direction": _TEXT, "force": _FORCE, "minimum": _FORCE, "link": _TEXT}
-    units |= dict.fromkeys(("displacement", *"xyz"), _LENGTH) | dict.fromkeys(cables, _FORCE)
-    units |= zip(joints, (_LENGTH if slides else ANGLE for slides in arm.slides), strict=True)
-    followers = [name for name in arm.body.all_joints if name not in joints]
-    units |= dict.fromkeys(followers, ANGLE | _LENGTH)
+    units = {"test": TEXT, "direction": TEXT, "force": FORCE, "minimum": FORCE, "link": TEXT}
+    units |= dict.fromkeys(("displacement", *"xyz"), _LENGTH) | dict.fromkeys(cables, FORCE)
+    units |= joints.units
     table = Columns(path, units, "loops")
     refuse = table.refuse
     text = table.text
@@ -107,12 +103,11 @@ def read_loops(
                 f"test {label}: its readings span {moved:.4g} m, more than the arm is long, "
                 f"{arm.length:.4g} m; give the unit in which they were read"
             )
-        angles = tuple(number(fixed(rows, q), q) if q in table else 0.0 for q in joints)
-        logged = {q: np.array([number(fixed(rows, q), q)]) for q in followers if q in table}
-        require_followers(arm.body.coupling, arm.body.all_joints, np.array([angles]), logged)
+        for name in joints.units:
+            fixed(rows, name)
         return WeightLoop(
             direction=AXES[direction],
-            angles=angles,
+            angles=tuple(joints.angles(table, rows[:1])[0].tolist()),
             forces=tuple(number(row, "force") for row in rows),
             displacements=(read[:, 0] if len(readings) == 1 else read) if readings else None,  # type: ignore[arg-type]
             tension=tuple(before) if tensions and tensions != ["minimum"] else None,
@@ -131,7 +126,8 @@ def read_loops(
     for name in ("test", "direction"):
         if name not in table:
             refuse(f"has no column {name}")
-    for name in ("force", *readings, *tensions, *(joint for joint in joints if joint in table)):
+    angles = [name for name in arm.joint_names if name in table]
+    for name in ("force", *readings, *tensions, *angles):
         table.factor(name)
     if tensions and minimum is not None:
         refuse("has tensions; leave out minimum")
@@ -193,16 +189,16 @@ def read_tip_positions(
         6
     """
     names = instance("arm", arm, Manipulator).cables.names
-    units = {"label": _TEXT} | dict.fromkeys("xyz", _LENGTH) | dict.fromkeys(names, _LENGTH)
-    units |= {"direction": _TEXT, "force": _FORCE, "mass": _MASS}
-    units |= {"link": _TEXT, "load_link": _TEXT}
+    units = {"label": TEXT} | dict.fromkeys("xyz", _LENGTH) | dict.fromkeys(names, _LENGTH)
+    units |= {"direction": TEXT, "force": FORCE, "mass": _MASS}
+    units |= {"link": TEXT, "load_link": TEXT}
     table = Columns(path, units, "positions")
     axes, cables = ([name for name in group if name in table] for group in ("xyz", names))
     if not axes or not cables:
         table.refuse(f"needs a column x, y or z [mm], and one of a cable, such as {names[0]} [mm]")
-    motors = "tension" if table.unit[cables[0]] in _FORCE else "pull"
+    motors = "tension" if table.unit[cables[0]] in FORCE else "pull"
     if motors == "tension":
-        table.units |= dict.fromkeys(cables, _FORCE)
+        table.units |= dict.fromkeys(cables, FORCE)
     loads = [name for name in ("force", "mass") if name in table]
     for name in (*axes, *cables, *loads):
         table.factor(name)

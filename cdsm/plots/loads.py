@@ -10,11 +10,11 @@ from matplotlib.lines import Line2D
 
 from cdsm.plots import style
 from cdsm.plots.style import Panels
+from cdsm.support.determination import INTERVAL
 
 if TYPE_CHECKING:
     from cdsm.estimation import LoadEstimate
 
-_HALF = 1.96  # half width of an interval of 95 % in standard deviations
 _ROW = 0.22  # height of a row [inch]
 _FRAME = 0.75  # height of the rest of a panel [inch]
 _INSTRUMENTS: Final[dict[str, Any]] = {"color": style.BLUE, "lw": 3.0}
@@ -73,7 +73,7 @@ def _draw(panel: Axes, estimate: LoadEstimate, chosen: Any) -> None:
             )
             continue
         load = estimate.loads[i]
-        half = _HALF * estimate.std[i]
+        half = INTERVAL * estimate.std[i]
         for gid, reach, look in (
             ("friction", half + estimate.band[i], _FRICTION),
             ("instruments", half, _INSTRUMENTS),

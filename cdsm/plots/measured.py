@@ -1,4 +1,4 @@
-"""Plot fits, plans of measurements, budgets, searches for designs, and laws of wires."""
+"""Plot fits, plans of measurements, budgets and searches for designs."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 
 from cdsm.plots import style
 from cdsm.plots.style import MM, N_PER_MM, Panels
+from cdsm.support.determination import interval_in_percent
 from cdsm.support.format import plural
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def plot_experiment_plan(
     """Plot the expected 95 % intervals [%], and how often each candidate is tested."""
     panels = style.panels(axs, 2, height=2.6)
     left, right = panels
-    half = 196.0 * plan.std / abs(plan.values)
+    half = interval_in_percent(plan.std, plan.values)
     bars = left.barh(np.arange(half.size), np.where(np.isfinite(half), half, 0.0), color=style.BLUE)
     for bar, name in zip(bars, plan.names, strict=True):
         bar.set_gid(f"interval:{name}")

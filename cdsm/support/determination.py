@@ -18,6 +18,14 @@ from cdsm.support.values import Array, frozen
 _TOLERANCE = 1e-6  # smaller singular values of J, its columns scaled to length 1, are zero
 _UNLIKELY = 1e-3  # least probability of χ²; below it, the model does not explain the measurements
 
+INTERVAL = 1.96
+"""Half width of an interval of 95 % in standard deviations."""
+
+
+def interval_in_percent(std: Array, values: Array) -> Array:
+    """Return the half widths of the intervals of 95 % in per cent of the values."""
+    return 100.0 * INTERVAL * std / abs(values)
+
 
 def likely(chi_square: float, freedom: int) -> bool:
     """Whether right models leave this χ² or more in one of a thousand experiments, or oftener."""

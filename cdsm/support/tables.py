@@ -15,6 +15,15 @@ from cdsm.support.files import read_text
 ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 """Units of angles in a header, in SI."""
 
+SLIDE: Final = {"mm": 1e-3, "m": 1.0}
+"""Units of a prismatic joint in a header, in SI."""
+
+FORCE: Final = {"N": 1.0}
+"""Units of forces and tensions in a header, in SI."""
+
+TEXT: Final[dict[str, float]] = {}
+"""Units of a text in a header: none."""
+
 MEANINGFUL: Final = frozenset(
     {"force", "moment", "mass", "load", "direction", "displacement", "test", "target"}
     | {"tension", "pull", "minimum", "maximum", "link", "load_link"}
