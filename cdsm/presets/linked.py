@@ -6,12 +6,15 @@ import math
 from typing import Final
 
 import numpy as np
+from lxml import etree
+from numpy.typing import ArrayLike
 
 from cdsm.cable import Cable
 from cdsm.cable_path import Site
 from cdsm.manipulator import Manipulator
-from cdsm.presets.bodies import JOINT_AXES, SerialBody, chain
+from cdsm.presets.bodies import COMMENT, JOINT_AXES, SerialBody, chain, moving_joint
 from cdsm.presets.prototype import ELASTIC_STAGE
+from cdsm.urdf import E, inertial, urdf_text
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity
 
@@ -92,7 +95,7 @@ def simplex() -> Manipulator:
     strut_wire = LinearElasticity(70390e6 * 364.4e-6)
     horizontal_wire = LinearElasticity(71750e6 * 50.3e-6)
     diagonal_wire = LinearElasticity(72190e6 * 50.3e-6)
-    parts = ['<link name="floor"/>']
+    parts = [E.link(name="floor")]
     feet = {}
     struts = []
     for foot, head in _STRUTS.items():
@@ -124,25 +127,16 @@ def simplex() -> Manipulator:
         for pairs, wire in ((_HORIZONTAL, horizontal_wire), (_DIAGONAL, diagonal_wire))
         for a, b in pairs
     ]
-    urdf = f'<robot name="simplex">{"".join(parts)}</robot>'
+    urdf = urdf_text("simplex", parts, COMMENT)
     return Manipulator.from_urdf(urdf, [*cables, *struts], tip="head3", check_inertia=False)
 
 
-def _link(name: str, mass: float) -> str:
-    inertia = " ".join(f'i{a}="{_TINY}"' for a in ("xx", "yy", "zz"))
-    inertia += ' ixy="0" ixz="0" iyz="0"'
-    inertial = f'<inertial><mass value="{mass}"/><inertia {inertia}/></inertial>'
-    return f'<link name="{name}">{inertial}</link>'
+def _link(name: str, mass: float) -> etree._Element:
+    return E.link(inertial(mass, _TINY * np.eye(3)), name=name)
 
 
-def _joint(kind: str, parent: str, child: str, at: object, axis: object) -> str:
-    xyz = np.asarray(at)
-    unit = np.asarray(axis, dtype=float)
-    unit = unit / math.hypot(*unit)  # the norm of numpy has other last digits on other machines
-    origin, along = (" ".join(map(repr, v.tolist())) for v in (xyz, unit))
-    return (
-        f'<joint name="{child}_joint" type="{kind}">'
-        f'<parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="{origin}"/><axis xyz="{along}"/>'
-        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
-    )
+def _joint(kind: str, parent: str, child: str, at: ArrayLike, axis: ArrayLike) -> etree._Element:
+    along = np.asarray(axis, dtype=float)
+    along = along / math.hypot(*along)  # the norm of numpy has other last digits on other machines
+    where = np.asarray(at).tolist()
+    return moving_joint(kind, f"{child}_joint", parent, child, at=where, axis=along.tolist())
