@@ -152,10 +152,15 @@ def next_on_piece(model: Model, here: Stage, share: float) -> Stage | None:
         between = stable_between(stage.arm.at, here.pose.q, stage.pose.q)
         return stage if between else None
 
-    there = at(share)
-    if there is not None and not _passed(here, there).any():
-        there = _dipped(piece, here, there, at) or there
-    end = None if there is None else _end_of_smooth(at, here, there)
+    end = at(share)
+    # before a root, other values may have changed their sign that have it again behind the root
+    for _ in range(here.pose.q.size + here.pose.cable_lengths.size):
+        if end is None or end.share == here.share:
+            break
+        missed = end if _passed(here, end).any() else _dipped(piece, here, end, at)
+        if missed is None:
+            break
+        end = _end_of_smooth(at, here, missed)
     if end is None:
         return None
     stage = under(model, end, here.taut)

@@ -144,3 +144,33 @@ def test_the_end_of_a_law_is_named() -> None:
     assert held.locked is not None
     assert "law of cable" in held.following.limit
     assert "law of cable" in held.locked.limit
+
+
+def test_a_cable_that_slackens_and_would_push_back_within_one_step_is_not_missed() -> None:
+    """cable1_2 goes slack before cable3_1; a wire that could push would be taut again behind it."""
+    geometry = cdsm.Geometry.universal(
+        joints=4,
+        cables_per_joint=3,
+        link_length=0.0611,
+        base_length=0.0482,
+        disk_offset=0.00914,
+        hole_radius=0.0221,
+        link_mass=0.206,
+        lead=0.287,
+    )
+    law = cdsm.TabulatedElasticity([0, 5, 30, 200, 600], [0, 0.0025, 0.008, 0.02, 0.04])
+    arm = cdsm.Manipulator(geometry, law, gravity=(-1.47, -7.67, 1.09))
+    pose = arm.at([-0.00686, 0.0116, 0.0759, -0.144, 0.093, 0.169, 0.16, 0.152])
+    u = np.array([-0.838, 0.415, 0.353])
+    u /= np.linalg.norm(u)
+    held = cdsm.payload(pose, u, 1.8, 90.0, link="cross4")
+    assert held.locked is not None
+    slack = {event.place: event.load for event in held.locked.events if event.kind == "slack"}
+    loads = np.arange(0.5, 18.8, 0.5)
+    rest = [cdsm.equilibrium(pose, held.tension, {"cross4": [*(f * u), 0, 0, 0]}) for f in loads]
+    assert min(each.stiffness.margin for each in rest) > 0.3
+    for name in ("cable1_2", "cable3_1"):
+        c = arm.cables.names.index(name)
+        first = int(np.argmax([each.tension[c] < 1e-9 for each in rest]))
+        assert loads[first - 1] <= slack[name] <= loads[first]
+    assert held.locked.force == pytest.approx(18.842, abs=0.01)
