@@ -17,12 +17,16 @@ import typer.main
 
 import cdsm
 from cdsm.cli.arm import export, new, view
+from cdsm.cli.design import design
 from cdsm.cli.estimate import estimate
-from cdsm.cli.identify import fit, identify_parameters, reproduce
+from cdsm.cli.fit import fit
+from cdsm.cli.identify import identify_parameters
 from cdsm.cli.options import opt
 from cdsm.cli.output import debug_wanted, reported
-from cdsm.cli.plan import design, plan, sweep_postures
+from cdsm.cli.plan import plan
+from cdsm.cli.reproduce import reproduce
 from cdsm.cli.stiffness import buckle, show_stiffness, weigh
+from cdsm.cli.sweep import sweep_postures
 
 COMMANDS: Final[dict[str, Callable[..., int]]] = {
     "new": new,
