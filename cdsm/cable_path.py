@@ -208,8 +208,8 @@ class Sheath:
         length: Length of the sheath [m].
         wrap: Total angle φ by which it is bent [rad], 0 to 4π, at the working posture.
         friction: Coulomb friction coefficient μ [-] between cable and sheath, 0 to 2.
-        pieces: Number of places at which friction acts, 1 to 1000; 8 are within 0.5 % of the
-            continuous sheath for μφ = 1.
+        pieces: Number of places at which friction acts, 1 to 1000; 8 are within 0.15 %
+            of the continuous sheath for μφ = 1.
 
     Raises InvalidInput if an attribute is anything else.
 

@@ -46,8 +46,8 @@ class Status(IntEnum):
     """A tension is outside the domain of its law (ElasticityRangeError): tensions, residual, active
     and load terms exist; quantities that need the cable stiffness do not."""
     SINGULAR = 6, "the stiffness matrix is singular, or no tensions make the arm stable"
-    """K_θ is singular (SingularStiffness): along, compliance and cartesian do not exist. If the tip
-    is also IMMOBILE, pseudoinverse does not exist."""
+    """`K_θ` is singular (SingularStiffness): along, compliance and cartesian do not exist. If the
+    tip is also IMMOBILE, pseudoinverse does not exist."""
     IMMOBILE = 7, "the tip can hardly move in some direction"
     """The tip can hardly move in some direction (SingularStiffness): cartesian and pseudoinverse do
     not exist, all other quantities exist."""

@@ -12,7 +12,8 @@ from matplotlib.mathtext import MathTextParser
 
 from docs.formulas import latex, typeset
 
-LISTED = (Path(__file__).parents[1] / "docs/reference/api.rst").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[1] / "docs"
+LISTED = (DOCS / "reference/api.rst").read_text(encoding="utf-8")
 CODE = re.compile(r"``.*?``|:\w+:`.*?`", re.DOTALL)
 UNIT = re.compile(r"(?<![\w)])\[.*?\]", re.DOTALL)
 FORMULA = re.compile("`(.*?)`", re.DOTALL)
@@ -43,6 +44,16 @@ def test_formulas_of_public_docstrings_stand_in_backquotes() -> None:
     plain = {name: UNIT.sub("", FORMULA.sub("", text)) for name, text in TEXTS.items()}
     found = {name: IS_FORMULA.findall(text) for name, text in plain.items()}
     assert {name: signs for name, signs in found.items() if signs} == {}
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.rglob("[a-z]*.md")), ids=lambda page: page.stem)
+def test_formulas_of_pages_are_typeset(page: Path) -> None:
+    if page.stem in {"changelog", "commands", "contributing", "paper"}:  # made of other texts
+        return
+    text = page.read_text(encoding="utf-8")
+    for typeset_or_code in (r"```.*?```", r"\$\$.*?\$\$", r"\$[^$]*\$", r"`[^`]*`", r"\[.*?\]"):
+        text = re.sub(typeset_or_code, "", text, flags=re.DOTALL)
+    assert IS_FORMULA.findall(text) == []
 
 
 def test_each_formula_can_be_typeset() -> None:

@@ -59,7 +59,9 @@ def hinge() -> Iterator[Row]:
     arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(EA), gravity=(0, 0, 0))
     ours = float(cdsm.stiffness(arm.at([0.0]), np.full(2, F)).joint[0, 0])
     theirs = 2.0 * EA * (1.0 + F / EA) / (lead + 2.0 * h) * R**2 - F * h
-    yield Row("hinge under 400 N", "2 EA/l_0 R² − F h", "N m/rad", theirs, ours, 1e-12 * theirs)
+    yield Row(
+        "hinge under 400 N", r"$2\,EA/l_0\,R^2 - F h$", "N m/rad", theirs, ours, 1e-12 * theirs
+    )
 
 
 def capstan() -> Iterator[Row]:
@@ -80,7 +82,7 @@ def capstan() -> Iterator[Row]:
     T = history.segment_tensions[-1][start[-2] :]
     theirs = math.exp(-friction * segments.wrap[passed].sum())
     ours = float(T[-1] / T[0])
-    source = f"exp(−μ Σβ), {np.count_nonzero(passed)} holes, μ = {friction:g}"
+    source = rf"$\exp(-\mu\sum\beta)$, {np.count_nonzero(passed)} holes, μ = {friction:g}"
     what = "tension at the end of a pulled cable over that of its motor"
     yield Row(what, source, "-", theirs, ours, 1e-9)
 
