@@ -40,7 +40,8 @@ from numpy.typing import NDArray
 from cdsm.routing import Indices, Routing, Spans, cross, dot
 from cdsm.support.values import Array
 
-_IN_PLANE = 1e-12  # sine of γ, and kink per radian, that are rounding
+IN_PLANE = 1e-12
+"""Sine of γ, and kink per radian, that are rounding."""
 
 
 class Ends(NamedTuple):
@@ -177,7 +178,7 @@ class Shifts:
         """κ with its sign (2T,) [m] where cables leave a groove; None: all in their planes."""
         held = np.concatenate([self.groove, self.groove])
         sine = np.where(held, self._sine, 0.0)
-        if abs(sine).max(initial=0.0) <= _IN_PLANE:
+        if abs(sine).max(initial=0.0) <= IN_PLANE:
             return None
         radius = np.concatenate([self.radius, self.radius])
         return np.asarray(self.ends.way * radius * sine / (1.0 - sine * sine))
@@ -228,7 +229,7 @@ class Shifts:
         rate = self._pieces.turn[:, ends.piece]
         rate[:, :T] -= self._pieces.turned[:, ends.piece[:T]]
         kink = dot(self._contacts.across[:, :, None], rate) * (-ends.way * smooth)[:, None]
-        if abs(kink).max() <= _IN_PLANE:
+        if abs(kink).max() <= IN_PLANE:
             return None
         first, tilt = self._unrolled(kink)
         last = first + self.arc[:, None] * tilt

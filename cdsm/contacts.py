@@ -66,8 +66,11 @@ SURFACE = 1e-9
 Rounding of √(R² − r²) would be as long, and its direction would be noise.
 """
 
-_STILL = 1e-13  # motion of the contacts [m] that is still to come when they count as settled
-_SWEEPS = 500  # smooth pulleys that nearly touch each other needed 155 of them
+STILL = 1e-13
+"""Motion of the contacts [m] that is still to come when they count as settled."""
+
+SWEEPS = 500
+"""Most sweeps; smooth pulleys that nearly touch each other needed 155 of them."""
 
 
 class Pulleys(NamedTuple):
@@ -294,10 +297,10 @@ def settle_row(
         outcome = TOUCHES
         culprit = low
         settled = count <= 1
-        for _ in range(_SWEEPS if count > 1 else 1):
+        for _ in range(SWEEPS if count > 1 else 1):
             moved, outcome, culprit = _sweep(True, start, end, low, high, pulleys, at)
             # motions fall by this sweep's ratio at least, or by its square in the plane
-            if moved < _STILL or moved * moved < _STILL * before:
+            if moved < STILL or moved * moved < STILL * before:
                 settled = True
                 break
             before = moved

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm import readings
+from cdsm.batch.path_arrays import ContactArrays, paths_of, shapes_of_contacts
 from cdsm.batch.quantities import READINGS, Codes, read
 from cdsm.batch.rows import (
     BodyArrays,
-    Directions,
     LoadArrays,
     PoseArrays,
     Rows,
@@ -24,6 +24,7 @@ from cdsm.batch.rows import (
     side_by_side,
     tables_of,
 )
+from cdsm.batch.smooth_rows import Directions, Places, smooth_shifts
 from cdsm.batch.spring_rows import SpringRows
 from cdsm.definition import TERMS_OF_K
 from cdsm.quantities import QUANTITIES
@@ -72,7 +73,10 @@ class Chunk:
         self._kernels = kernels
         self._part = part
         self._scratch = scratch
-        self._table = tables_of(rows.arm, rows.touches)
+        touches = rows.touching.touches if rows.touching else None
+        self._table = tables_of(rows.arm, touches)
+        self._paths = None if touches is None else paths_of(rows.arm, touches)
+        self._contacts: ContactArrays | None = None  # of an arm with pulleys, set with the posture
         self._names = set(rows.names)
         self._q = rows.q[part]
         self._width = width if kernels.COMPILED else len(self._q)
@@ -132,10 +136,29 @@ class Chunk:
         self._springs = laws = SpringRows.at(self._rows.arm.springs, angles, k)
         if laws:
             body = body._replace(spring=frozen(body.spring * laws.linear[:, None]))
+        if self._paths is not None:
+            contacts = self._contacts = self._find_contacts(q)
+            fixed = contacts.fixed.view()
+            site = contacts.site.view()
+            body = body._replace(site=frozen(site), fixed=frozen(fixed))
         self._kernels.fill_pose(table.arm, body, q, W, self._load_arrays(), at)
         if laws:
             np.subtract(at.torque, side_by_side(laws.torque, self._width), out=at.torque)
         return at
+
+    def _find_contacts(self, q: Array) -> ContactArrays:
+        """Find the contacts with the pulleys, which are sites of the arm in each row."""
+        assert self._paths is not None
+        assert self._rows.touching is not None
+        arrays = (
+            self._scratch.empty(f"contacts {i}{shape}", len(q), *shape, self._width)
+            for i, shape in enumerate(shapes_of_contacts(self._paths))
+        )
+        contacts = ContactArrays(*arrays)
+        kernels = self._rows.touching.kernels
+        shift = self._table.body(self._width if kernels.compiled else 1).shift
+        kernels.fill_contacts(self._table.arm, shift, self._paths, q, True, contacts)
+        return contacts
 
     def _load_arrays(self) -> LoadArrays:
         """Return the loads on links in blocks; read-only as :meth:`_body`, but for the wrenches."""
@@ -230,20 +253,11 @@ class Chunk:
                 self._read(values, wanted, doubtful, terms, terms.sum(axis=1), at)
             return values
         terms = self._terms(by_all_joints, F, k, W)
-        if self._rows.shifts is not None:
-            terms[:, 0] += self._shifts(by_all_joints, F)
         values = dict(zip(TERMS_OF_K, terms.swapaxes(0, 1), strict=False))
         values["joint"] = terms.sum(axis=1)
         if wanted:
             self._read(values, wanted, fine, terms[fine], values["joint"][fine], at)
         return values
-
-    def _shifts(self, by_all_joints: PoseArrays, F: Array) -> Array:
-        """Return what shifts of contacts add to the active term (n, nv, nv)."""
-        assert self._rows.shifts is not None
-        at = by_all_joints
-        places = Directions(*map(self._one_by_one, (at.segment, at.motion, at.axis)))
-        return self._rows.shifts(places, self._one_by_one(F), self._part)
 
     def _allow_slack(
         self,
@@ -264,8 +278,6 @@ class Chunk:
         if "along" not in self._names or not rows.size:
             return
         terms = self._terms(by_all_joints, F, k, W, rows)
-        if self._rows.shifts is not None:
-            terms[:, 0] += self._shifts(by_all_joints, F)[rows]
         J_v = self._tip_jacobian(at)[rows, :3]
         torque = self._rows.directions @ J_v
         moves = readings.moves_tip(torque, J_v)
@@ -288,7 +300,7 @@ class Chunk:
         return (
             self._kernels.COMPILED
             and self._table.coupling is None
-            and self._rows.shifts is None
+            and (self._paths is None or bool(self._paths.groove.all()))
             and self._names.isdisjoint(TERMS_OF_K)
             and self._rows.arm.motors.yielding is None
             and wanted <= {"along"}
@@ -298,7 +310,7 @@ class Chunk:
         self, at: PoseArrays, F: Array, k: Array, W: Array
     ) -> tuple[dict[str, Array], Array]:
         """Compute K_θ and ``along`` without the terms, and pivots (n,): where small, not exact."""
-        K, size = self._stiffness(at, self._body_with_tangents(), F, k, W, 1)
+        K, size = self._stiffness(at, self._body_with_tangents(), F, k, W, 1, self._contacts)
         values = {"joint": self._one_by_one(K[:, 0]).copy()} if "joint" in self._names else {}
         pivot = np.zeros((len(F), self._width))
         if "along" in self._names:
@@ -314,6 +326,7 @@ class Chunk:
     ) -> Array:
         """Return the 4 or 5 terms (n, 5, nv, nv) of K_θ of some rows, or of all."""
         body = self._body_with_tangents()
+        contacts = self._contacts
         number = len(self._q)
         coupling = self._table.coupling
 
@@ -322,6 +335,7 @@ class Chunk:
 
         if rows is not None:
             at = PoseArrays(*map(some, at))
+            contacts = contacts and ContactArrays(*map(some, contacts))
             F = some(F)
             k = some(k)
             W = some(W)
@@ -331,7 +345,7 @@ class Chunk:
             elif self._springs:
                 body = body._replace(spring=frozen(some(body.spring)))
         count = 5 if self._rows.arm.has_springs or "springs" in self._names else 4
-        terms = one_by_one(self._stiffness(at, body, F, k, W, count)[0], number)
+        terms = one_by_one(self._stiffness(at, body, F, k, W, count, contacts)[0], number)
         terms = coupling.square(terms) if coupling else terms
         soft = self._rows.arm.motors.yielding
         if soft is not None:  # of rank m, beside the kernel
@@ -341,14 +355,44 @@ class Chunk:
         return terms
 
     def _stiffness(
-        self, at: PoseArrays, body: BodyArrays, F: Array, k: Array, W: Array, count: int
+        self,
+        at: PoseArrays,
+        body: BodyArrays,
+        F: Array,
+        k: Array,
+        W: Array,
+        count: int,
+        contacts: ContactArrays | None,
     ) -> tuple[Array, Array]:
         """Compute the 4 or 5 terms (B, 5, n, n, W) of K_θ, or 1: their sum, with its size."""
         B, n, _ = at.gravity.shape
         K = self._scratch.empty(f"K{count}", B, count, n, n, self._width)
         size = self._scratch.empty("size", B, n, self._width)
         self._kernels.fill_stiffness(self._table.arm, body, at, F, k, W, K, size)
+        if contacts is not None:
+            self._add_shifts(at, contacts, F, K, size)
         return K, size
+
+    def _add_shifts(
+        self, at: PoseArrays, contacts: ContactArrays, F: Array, K: Array, size: Array
+    ) -> None:
+        """Add to the active term what contacts shift beside the planes of their pulleys."""
+        paths = self._paths
+        touching = self._rows.touching
+        assert paths is not None
+        assert touching is not None
+        if paths.groove.all():
+            touching.kernels.add_shifts(self._table.arm, paths, at, contacts, F, K, size)
+            return
+        count = len(F) * F.shape[2]  # not eliminated in place, so the size is not needed
+
+        def rows_of(x: Array) -> Array:
+            return one_by_one(x, count)
+
+        directions = Directions(*map(rows_of, (at.segment, at.motion, at.axis)))
+        places = Places(*(rows_of(getattr(contacts, name)) for name in Places._fields))
+        added = smooth_shifts(self._rows.arm, touching.touches, directions, places, rows_of(F))
+        K[:, 0] += side_by_side(added, F.shape[2])
 
     def _read(
         self,

@@ -128,7 +128,8 @@ def _add_dot(a: Array, b: Array, out: Array) -> None:
 
 
 @inner_loop
-def _add_product(a: Array, b: Array, out: Array) -> None:
+def add_product(a: Array, b: Array, out: Array) -> None:
+    """Add a b."""
     for w in lanes(out):
         out[w] += a[w] * b[w]
 
@@ -205,7 +206,7 @@ def _add_spread(p: Array, f: Array, out: Array) -> None:
     """Add p fᵀ to a matrix (3, 3, W)."""
     for x in range(3):
         for y in range(3):
-            _add_product(p[x], f[y], out[x, y])
+            add_product(p[x], f[y], out[x, y])
 
 
 @inner_loop
@@ -262,6 +263,35 @@ def _add_loads(
                 _add(spread[j, x, y], spread[k, x, y])
 
 
+@inner_loop
+def place_frames(
+    arm: ArmArrays,
+    shift: Array,
+    q: Array,
+    turn: Array,
+    frames: tuple[Array, Array, Array],
+    z: Array,
+) -> None:
+    """Fill frames and twists, from the base on: R, o and v of all frames, and z (n, 3, W).
+
+    ``turn`` (2, W) is scratch. The base's frame is given.
+    """
+    R, o, v = frames
+    for j in range(len(arm.parent)):
+        k = arm.parent[j]
+        for w in lanes(turn):
+            turn[0, w] = np.cos(q[j, w])
+            turn[1, w] = np.sin(q[j, w])
+        for x in range(3):
+            _rotate(R[k, x], arm.axis[j], z[j, x])
+            _rotate(R[k, x], arm.slide[j], v[j, x])
+            _place(o[k, x], R[k, x], shift[j], o[j + 1, x])
+            add_product(q[j], v[j, x], o[j + 1, x])
+            for y in range(3):
+                _compose_rotation(R[k, x], arm.turn[j], y, turn, R[j + 1, x, y])
+        _add_cross(o[j + 1], z[j], v[j])
+
+
 @kernel
 def fill_pose(
     arm: ArmArrays,
@@ -289,30 +319,23 @@ def fill_pose(
     for x in range(3):
         R[0, x, x] = 1.0
     for b in range(len(q)):
-        shared = b % len(body.mass)  # one block of dimensions for all postures, or one for each
+        # one block of dimensions for all postures, or one for each; contacts are sites
+        shared = b % len(body.mass)
         z = at.axis[b]
         L = at.length[b]
         J = at.jacobian[b]
-        # frames and twists, from the base on
-        for j in range(n):
-            k = arm.parent[j]
-            for w in lanes(turn):
-                turn[0, w] = np.cos(q[b, j, w])
-                turn[1, w] = np.sin(q[b, j, w])
-            for x in range(3):
-                _rotate(R[k, x], arm.axis[j], z[j, x])
-                _rotate(R[k, x], arm.slide[j], v[j, x])
-                _place(o[k, x], R[k, x], body.shift[shared, j], o[j + 1, x])
-                _add_product(q[b, j], v[j, x], o[j + 1, x])
-                for y in range(3):
-                    _compose_rotation(R[k, x], arm.turn[j], y, turn, R[j + 1, x, y])
-            _add_cross(o[j + 1], z[j], v[j])
+        place_frames(arm, body.shift[shared], q[b], turn, (R, o, v), z)
 
         # sites, segments between them, L and J_L
         for p in range(P):
             for x in range(3):
-                _place(o[arm.frame[p], x], R[arm.frame[p], x], body.site[shared, p], site[p, x])
-        L[:] = body.fixed[shared]
+                _place(
+                    o[arm.frame[p], x],
+                    R[arm.frame[p], x],
+                    body.site[b % len(body.site), p],
+                    site[p, x],
+                )
+        L[:] = body.fixed[b % len(body.fixed)]
         J[:] = 0.0
         at.shortest[b] = np.inf
         for s in range(len(arm.ends)):
@@ -432,7 +455,7 @@ def fill_stiffness(
                         row[w] = k[b, c, w] * J[c, i, w]
                     for j in range(i, n):
                         if arm.pulls[c, j]:
-                            _add_product(row, J[c, j], K[b, passive, i, j])
+                            add_product(row, J[c, j], K[b, passive, i, j])
         _accumulate_diagonal(K[b, passive], diagonal, size[b])
 
         # gravity and load: ∂g/∂θ, then −∂(J_Xᵀ W)/∂θ for the force
@@ -534,7 +557,7 @@ def fill_along(
                 s[j] = t[j]
             for k in range(n):  # t = L⁻¹ J_vᵀ u, s = U⁻ᵀ J_vᵀ u
                 s[k] /= A[k, k]
-                _add_product(s[k], t[k], r)
+                add_product(s[k], t[k], r)
                 for i in range(k + 1, n):
                     _subtract_product(A[i, k], t[k], t[i])
                     _subtract_product(A[k, i], s[k], s[i])

@@ -27,16 +27,20 @@ CableStiffness = Callable[[Array, Array, slice | Indices], Array]
 """Stiffness (n, C) of cables of lengths L (n, C) under F (n, C) in some rows; −1 outside."""
 
 
-class Directions(NamedTuple):
-    """Segments and joints in n rows."""
+class ContactKernels(NamedTuple):
+    """Kernels of contacts with pulleys, compiled or run by numpy."""
 
-    segment: Array  # direction, and 1/length of each segment (n, S, 4)
-    motion: Array  # d of each joint of each segment (n, S, m, 3)
-    axis: Array  # z of all joints (n, joints, 3)
+    fill_contacts: Callable[..., None]
+    add_shifts: Callable[..., None]
+    compiled: bool
 
 
-ShiftsOfRows = Callable[[Directions, Array, slice], Array]
-"""What shifts of contacts add to H_L·F (n, nv, nv) under F (n, C) in a slice of rows."""
+class Touching(NamedTuple):
+    """What rows over pulleys share."""
+
+    touches: tuple[bool, ...]  # which pulleys touch in all rows (P,)
+    kernels: ContactKernels
+
 
 _Scalar = TypeVar("_Scalar", np.float64, np.bool_)
 
@@ -132,8 +136,7 @@ class Rows:
         cable_stiffness: That of each row; by default that of the arm's cables.
         check_limits: Whether rows beyond the joint limits are skipped.
         status: :class:`Status` (N,) of rows that are lost already; by default none is.
-        touches: Which pulleys touch in all rows (P,); None: not known, or there are none.
-        shifts: What shifts of contacts add to H_L·F (n, nv, nv) under F (n, C) in a slice of rows.
+        touching: Which pulleys touch in all rows; None: not known, or there are none.
     """
 
     arm: Manipulator
@@ -147,8 +150,7 @@ class Rows:
     cable_stiffness: CableStiffness | None = None
     check_limits: bool = True
     status: Codes | None = None
-    touches: tuple[bool, ...] | None = None
-    shifts: ShiftsOfRows | None = None
+    touching: Touching | None = None
     loads: RowLoads | None = None
 
     @cached_property

@@ -9,6 +9,7 @@ import os
 import platform
 import sys
 import threading
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import cache
@@ -22,8 +23,8 @@ from numpy.typing import NDArray
 
 from cdsm.batch.chunk import Chunk, Scratch
 from cdsm.batch.quantities import Codes, shapes_of
-from cdsm.batch.rows import ArmTables, Rows, tables_of
-from cdsm.batch.wrapped_rows import solve_wrapped
+from cdsm.batch.rows import ArmTables, ContactKernels, Rows, tables_of
+from cdsm.batch.wrapped_rows import PLAIN, solve_wrapped
 from cdsm.motors import refuse_shared
 from cdsm.quantities import QUANTITIES
 
@@ -96,12 +97,39 @@ def compiled_kernels() -> ModuleType:
 @cache
 def numpy_kernels() -> ModuleType:
     """Load the source of the kernels once more, without the compiler."""
-    name = "cdsm.batch._numpy_kernels"
-    spec = importlib.util.spec_from_file_location(name, _source())
+    return _without_compiler("kernels")
+
+
+def contact_kernels(count: int) -> ContactKernels:
+    """Choose the kernels of contacts for ``count`` rows; numba keeps the compiled ones on disk."""
+    if count <= PLAIN:
+        return _numpy_contact_kernels()
+    from cdsm.batch.contact_kernels import fill_contacts
+    from cdsm.batch.shift_kernels import add_shifts
+
+    return ContactKernels(fill_contacts, add_shifts, compiled=True)
+
+
+@cache
+def _numpy_contact_kernels() -> ContactKernels:
+    loops = {name: x for name, x in vars(numpy_kernels()).items() if not name.startswith("_")}
+    fill_contacts = _without_compiler("contact_kernels", loops).fill_contacts
+    add_shifts = _without_compiler("shift_kernels", loops).add_shifts
+    return ContactKernels(fill_contacts, add_shifts, compiled=False)
+
+
+def _without_compiler(module_name: str, names: Mapping[str, Any] | None = None) -> ModuleType:
+    """Load the source of a module of kernels as ``_numpy_…``, which numba does not compile.
+
+    ``names`` are what it would import from compiled kernels.
+    """
+    name = f"cdsm.batch._numpy_{module_name}"
+    path = _source().with_stem(module_name)
+    spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    module.__dict__["COMPILED"] = False
+    module.__dict__.update(names or {}, COMPILED=False)
     sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
@@ -159,9 +187,9 @@ def solve_rows(rows: Rows, threads: int = 1) -> tuple[dict[str, NDArray[Any]], C
     if rows.bounds is not None:
         remedy = "Give tension=, or use distribute_tension(pose, assembly=) posture by posture."
         refuse_shared(rows.arm.motors, "minimum", remedy)
-    if rows.arm.wraps is not None and rows.touches is None:
-        return solve_wrapped(rows, threads, solve_rows)
-    table = tables_of(rows.arm, rows.touches)
+    if rows.arm.wraps is not None and rows.touching is None:
+        return solve_wrapped(rows, threads, contact_kernels(len(rows.q)), solve_rows)
+    table = tables_of(rows.arm, rows.touching.touches if rows.touching else None)
     count = len(rows.q)
     kernels = choose_kernels(table, count)
     width = 32 if rows.arm.nv >= 80 else 64

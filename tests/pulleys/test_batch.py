@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.batch import wrapped_rows
+from cdsm.batch import solution
 from tests.support.pulleys import finger
 
 OUTPUTS = ("joint", "active", "passive", "cable_lengths", "length_jacobian", "along", "tip")
@@ -29,17 +29,26 @@ def mixed() -> cdsm.Manipulator:
     return arm.with_cables(cables)
 
 
-@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize(
+    ("compiled", "contacts_compiled"),
+    [(False, False), (False, True), (True, False), (True, True)],
+    ids=["by numpy", "contacts compiled", "pose compiled", "compiled"],
+)
 @pytest.mark.parametrize(
     "arm",
     [finger(), finger(plane=False), finger(plane=False, groove=False), mixed()],
     ids=["in the plane", "beside grooves", "smooth", "mixed"],
 )
 def test_rows_are_postures(
-    arm: cdsm.Manipulator, compiled: bool, monkeypatch: pytest.MonkeyPatch
+    arm: cdsm.Manipulator,
+    compiled: bool,
+    contacts_compiled: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    if compiled:
-        monkeypatch.setattr(wrapped_rows, "_PLAIN", 0)
+    kernels = solution.compiled_kernels() if compiled else solution.numpy_kernels()
+    monkeypatch.setattr(solution, "choose_kernels", lambda *_: kernels)
+    if contacts_compiled:
+        monkeypatch.setattr(solution, "PLAIN", 0)
     rng = np.random.default_rng(0)
     q = rng.uniform(-REACH, REACH, (60, 4))
     q[:30, 0] = 0.0
@@ -68,6 +77,14 @@ def test_rows_are_postures(
         if batch.status[i] == cdsm.Status.OK:
             assert batch["along"][i] == pytest.approx(K.along("z"), rel=1e-9)
     assert len(patterns) > 10
+    # with these outputs a kernel has the sum of the terms alone
+    alone = cdsm.evaluate(arm, q, F, outputs=("joint", "along"), direction="z")
+    np.testing.assert_array_equal(alone.status, batch.status)
+    size = abs(batch["joint"]).max(axis=(1, 2), keepdims=True)
+    known = np.isfinite(size.ravel())
+    error = abs(alone["joint"] - batch["joint"])[known] / size[known]
+    assert error.max() < 1e-12
+    np.testing.assert_allclose(alone["along"][alone.ok], batch["along"][batch.ok], rtol=1e-9)
 
 
 def test_distributed_tensions_and_sweeps_know_pulleys() -> None:
