@@ -18,7 +18,7 @@ from cdsm.status import Status
 from cdsm.support.format import place, plural
 from cdsm.support.values import Array
 from cdsm.sweeps.entries import Entries, counted
-from cdsm.sweeps.poses import RandomPoses, joint_angles
+from cdsm.sweeps.poses import RandomPoses, finite_limits, joint_angles
 
 _BALANCED: Final = (
     *(Status.OK, Status.OUTSIDE_ELASTICITY, Status.SINGULAR),
@@ -153,8 +153,7 @@ def _limit(entries: Entries) -> tuple[float | None, float]:
     nearest = float(np.maximum(arm.lower, -arm.upper).max(where=turns, initial=0.0))
     limits = [limit for limit in _LIMITS if nearest < limit < widest]
     q = joint_angles(arm, RandomPoses(_TRIED))
-    lower = np.where(np.isinf(arm.lower), -math.pi, arm.lower)
-    upper = np.where(np.isinf(arm.upper), math.pi, arm.upper)
+    lower, upper = finite_limits(arm)
     unit = (q - lower) / np.where(upper > lower, upper - lower, 1.0)
 
     def share_within(limit: float) -> float:
