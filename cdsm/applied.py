@@ -38,13 +38,10 @@ class TipLoad:
 
     def energy(self, pose: Posture) -> float:
         """Compute U [J] against the reference."""
-        from scipy.spatial.transform import Rotation  # slow to import
-
         assert self.reference is not None
         start = self.reference.tip
-        turned = Rotation.from_matrix(pose.tip[:3, :3] @ start[:3, :3].T).as_rotvec()
-        moved = pose.tip[:3, 3] - start[:3, 3]
-        return float(-self.wrench[:3] @ moved - self.wrench[3:] @ turned)
+        turn = pose.tip[:3, :3] @ start[:3, :3].T
+        return _energy(self.wrench, pose.tip[:3, 3] - start[:3, 3], turn)
 
     def torque(self, pose: Posture) -> Array:
         """Compute −J_Xᵀ W (nv,) [N m]."""
@@ -75,13 +72,18 @@ class PointLoad:
 
     def energy(self, pose: Posture) -> float:
         """Compute U [J] against the reference."""
-        from scipy.spatial.transform import Rotation  # slow to import
-
         assert self.reference is not None
-        turn = self.at.rotation(pose) @ self.at.rotation(self.reference).T
         moved = self.at.position(pose) - self.at.position(self.reference)
-        turned = Rotation.from_matrix(turn).as_rotvec()
-        return float(-self.wrench[:3] @ moved - self.wrench[3:] @ turned)
+        turn = self.at.rotation(pose) @ self.at.rotation(self.reference).T
+        return _energy(self.wrench, moved, turn)
+
+
+def _energy(wrench: Array, moved: Array, turn: Array) -> float:
+    """Compute U [J] of a dead wrench W (6,) whose point moved (3,) [m] and turned (3, 3)."""
+    from scipy.spatial.transform import Rotation  # slow to import
+
+    turned = Rotation.from_matrix(turn).as_rotvec()
+    return float(-wrench[:3] @ moved - wrench[3:] @ turned)
 
 
 @dataclass(slots=True)

@@ -24,8 +24,7 @@ def link_point(arm: Manipulator, link: object, point: ArrayLike | None = None) -
     the origin of its frame. Raises InvalidInput if there is no such link, or no joint moves it.
     """
     if link is None:
-        if point is not None:
-            raise InvalidInput("point", "is a point of a link: give link= too.")
+        _require_no_point(point)
         return None
     if point is None and one_of("link", link, arm.body.link_names) == arm.tip_link:
         return None
@@ -90,12 +89,16 @@ def kept_point(
     link: object, point: ArrayLike | None
 ) -> tuple[str | None, tuple[float, ...] | None]:
     """Return a link and a point on it, of an arm that is not known yet."""
-    if link is None and point is not None:
-        raise InvalidInput("point", "is a point of a link: give link= too.")
     if link is None:
+        _require_no_point(point)
         return None, None
     load = Load(link, point=point)  # type: ignore[arg-type]
     return load.link, load.point
+
+
+def _require_no_point(point: ArrayLike | None) -> None:
+    if point is not None:
+        raise InvalidInput("point", "is a point of a link: give link= too.")
 
 
 def has_loads(value: object) -> bool:

@@ -100,8 +100,7 @@ class Motor:
         return any(torque * radius >= 0.0 for radius in self.cables.values())
 
     def __str__(self) -> str:
-        radii = ", ".join(f"{cable} {1e3 * r:+.4g} mm" for cable, r in self.cables.items())
-        return f"{self.name} ({radii}): {self.holds}"
+        return f"{self.name} ({_radii(self)}): {self.holds}"
 
     @property
     def holds(self) -> str:
@@ -111,6 +110,11 @@ class Motor:
         if math.isinf(self.stiffness):
             return "holds its angle"
         return f"holds its angle by {self.stiffness:.4g} N m/rad"
+
+
+def _radii(motor: Motor) -> str:
+    """Return its cables with their radii, in words."""
+    return ", ".join(f"{cable} {1e3 * r:+.4g} mm" for cable, r in motor.cables.items())
 
 
 def _checked_radii(cables: object) -> dict[str, float]:
@@ -303,8 +307,7 @@ class Motors(Printed):
     def __str__(self) -> str:
         rows = [("motor", "cables", "holds")]
         for motor in self.given:
-            radii = ", ".join(f"{cable} {1e3 * r:+.4g} mm" for cable, r in motor.cables.items())
-            rows.append((motor.name, radii, motor.holds))
+            rows.append((motor.name, _radii(motor), motor.holds))
         own = self.names[len(self.given) :]
         for name, force in zip(own, self._force, strict=True):
             rows.append((name, "its own", "holds its tension" if force else "holds its length"))

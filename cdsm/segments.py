@@ -15,6 +15,7 @@ from itertools import pairwise
 from typing import Self, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cdsm.cable import Cable
 from cdsm.cable_laws import CableLaws
@@ -56,6 +57,16 @@ class Chains:
     routing: Routing
     laws: CableLaws
     paths: ChainPaths | None = None
+
+    @property
+    def own(self) -> NDArray[np.bool_]:
+        """Whether each segment is of the cable of each hole (S, P)."""
+        return np.asarray(self.cable[:, None] == self.cable[self.hole])
+
+    @property
+    def behind(self) -> NDArray[np.bool_]:
+        """Whether each hole lies between each segment and its motor (S, P)."""
+        return np.asarray(self.own & (np.arange(self.cable.size)[:, None] > self.hole))
 
     @property
     def segment_names(self) -> tuple[str, ...]:

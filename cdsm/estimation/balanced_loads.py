@@ -80,7 +80,7 @@ def balance_loads(
     cable = segments.chains.cable
     C = motor_tension.size
     P = holes.mean.size
-    behind = behind_holes(pose)
+    behind = segments.chains.behind
     terms = without_cables(pose, known)
     own_torque = torque_of(terms, pose)
     own_stiffness = stiffness_of(terms, pose)
@@ -142,14 +142,6 @@ def balance_loads(
         tension_covariance=by_z @ after @ by_z.T,
         misfit=float(left @ left),
     )
-
-
-def behind_holes(pose: Posture) -> Array:
-    """Return 1 where a hole lies between segment and motor, else 0 (S, P)."""
-    chains = pose.segments.chains
-    own = chains.cable[:, None] == chains.cable[chains.hole]
-    beyond = np.arange(chains.cable.size)[:, None] > chains.hole
-    return np.asarray(own & beyond, dtype=np.float64)
 
 
 def _rank(

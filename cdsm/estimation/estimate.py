@@ -14,7 +14,6 @@ from cdsm.estimation.balanced_loads import (
     Instruments,
     LoadBalance,
     balance_loads,
-    behind_holes,
 )
 from cdsm.estimation.components import Components, LinksLike, components_of
 from cdsm.estimation.holes import Holes, SlidingLike, holes_of, sliding_of
@@ -317,7 +316,7 @@ def _determination(names: tuple[str, ...], scale: Array, balance: LoadBalance) -
 def _tensions(readings: CheckedReadings, holes: Holes, balance: LoadBalance) -> dict[str, Any]:
     """Return the fields of a :class:`TensionEstimate`."""
     pose = readings.pose
-    behind = behind_holes(pose)
+    behind = pose.segments.chains.behind
     even = readings.motor_tension[pose.segments.chains.cable]
     names = pose.arm.cables.names
     variance = np.maximum(np.diag(balance.tension_covariance), 0.0)

@@ -22,7 +22,6 @@ from scipy.optimize import least_squares
 from cdsm.applied import Applied, jacobian_at, position_at, without_cables
 from cdsm.dead_loads import LinkPoint
 from cdsm.errors import EquilibriumError, InvalidInput, listed
-from cdsm.estimation.balanced_loads import behind_holes
 from cdsm.estimation.estimate import checked_readings, spread
 from cdsm.estimation.holes import SlidingLike, holes_of, sliding_of
 from cdsm.loads import LoadsLike, link_point, loads_of
@@ -139,7 +138,7 @@ class _Problem:
         self.wires = wires
         self.points = points
         self.point_std = point_std
-        self.behind = behind_holes(pose)
+        self.behind = pose.segments.chains.behind
         self.cable = pose.segments.chains.cable
         self.start = pose.segments.chains.start
         self.taut = F > 0.0

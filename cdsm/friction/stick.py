@@ -311,8 +311,8 @@ def half_width(K: Stiffness, u: Array) -> float:
         soft = 1.0 / segments.chains.laws.stiffness(segments.lengths, F)
     forced = np.isinf(soft)  # the first segment of a force-controlled cable
     soft[forced] = 0.0
-    own = chains.cable[:, None] == chains.cable[chains.hole]  # segments of the hole's cable (S, P)
-    after = own & (np.arange(F.size)[:, None] > chains.hole)
+    own = chains.own
+    after = chains.behind
     mean = np.where(forced @ own, 0.0, (soft @ after) / (soft @ own))
     S = F[chains.hole] * (after - mean * own)
     pull = np.linalg.solve(K.joint.T, u @ K.posture.jacobian[:3])

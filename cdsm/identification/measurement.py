@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,6 +35,9 @@ from cdsm.support.validation import (
 )
 from cdsm.support.values import Array
 from cdsm.tension import Tension, distribute_tension
+
+if TYPE_CHECKING:
+    from cdsm.identification.tip_position import TipPosition
 
 _SUBSTEPS = 2  # of load_cycle; fixed, so that predictions are smooth functions of parameters
 
@@ -327,28 +330,34 @@ def _keep(measurement: Measurement | WeightLoop, **fields: object) -> None:
             "give one of tension= (measured, of each cable) and minimum= (a bound to distribute "
             f"from); {'neither' if tension is None else 'both'} given.",
         )
-    if not isinstance(measurement.label, str):
-        raise InvalidInput("label", f"{measurement.label!r} given; a text is needed.")
+    fields |= kept_fields(measurement)
     direction: ArrayLike = measurement.direction
     if isinstance(direction, str):
         direction = axis_vector("direction", direction)
     unit_direction("direction", direction)
     fields["direction"] = tuple(vector("direction", direction, 3, "in base axes").tolist())
-    fields["wrench"] = kept_loads("wrench", measurement.wrench)
-    fields["link"], fields["point"] = kept_point(measurement.link, measurement.point)
-    fields["angles"] = _row("angles", measurement.angles, "one angle [rad] per joint")
+    fields["angles"] = row_of_numbers("angles", measurement.angles, "one angle [rad] per joint")
     if tension is not None:
-        fields["tension"] = _row("tension", tension, "one tension [N] per cable")
+        fields["tension"] = row_of_numbers("tension", tension, "one tension [N] per cable")
     else:
         lowest = number_array("minimum", minimum)  # type: ignore[arg-type]
         one = lowest.ndim == 0
         row = "one bound [N], or one per cable"
-        fields["minimum"] = float(lowest) if one else _row("minimum", lowest, row)
+        fields["minimum"] = float(lowest) if one else row_of_numbers("minimum", lowest, row)
     for name, entry in fields.items():
         object.__setattr__(measurement, name, entry)
 
 
-def _row(name: str, value: object, meaning: str) -> tuple[float, ...]:
+def kept_fields(measurement: Measurement | WeightLoop | TipPosition) -> dict[str, object]:
+    """Check what all measurements have; return wrench, link and point as they are kept."""
+    if not isinstance(measurement.label, str):
+        raise InvalidInput("label", f"{measurement.label!r} given; a text is needed.")
+    link, point = kept_point(measurement.link, measurement.point)
+    return {"wrench": kept_loads("wrench", measurement.wrench), "link": link, "point": point}
+
+
+def row_of_numbers(name: str, value: object, meaning: str) -> tuple[float, ...]:
+    """Return numbers in a row; InvalidInput says what they are."""
     array = number_array(name, value)  # type: ignore[arg-type]
     if array.ndim != 1 or not array.size:
         raise InvalidInput(name, f"shape {array.shape} given; give {meaning}.")

@@ -11,12 +11,13 @@ import numpy as np
 from cdsm.applied import position_at
 from cdsm.dead_loads import Load
 from cdsm.errors import InvalidInput
-from cdsm.loads import kept_loads, kept_point, link_point
+from cdsm.identification.measurement import kept_fields, row_of_numbers
+from cdsm.loads import link_point
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.forward_statics import forward_statics
 from cdsm.support.format import coordinates, without_rounding
-from cdsm.support.validation import NO_WRENCH, number_array, positive, scalar
+from cdsm.support.validation import NO_WRENCH, positive, scalar
 from cdsm.support.values import Array
 
 NumbersOfCables = tuple[float, ...] | Mapping[str, float]
@@ -89,11 +90,8 @@ class TipPosition:
             remedy = f"give one of {', '.join(_MOTORS)}; {' and '.join(motors) or 'none'} given."
             raise InvalidInput("pull", remedy)
         (name,) = motors
-        if not isinstance(self.label, str):
-            raise InvalidInput("label", f"{self.label!r} given; a text is needed.")
+        fields |= kept_fields(self)
         fields |= {name: _numbers(name, getattr(self, name)), "std": std}
-        fields["wrench"] = kept_loads("wrench", self.wrench)
-        fields["link"], fields["point"] = kept_point(self.link, self.point)
         for key, kept in fields.items():
             object.__setattr__(self, key, kept)
 
@@ -157,8 +155,4 @@ def _numbers(name: str, value: object) -> NumbersOfCables:
     """Return numbers of cables, (C,) or by name; InvalidInput says what they must be."""
     if isinstance(value, Mapping):
         return {cable: scalar(f"{name}[{cable!r}]", value) for cable, value in value.items()}
-    array = number_array(name, value)  # type: ignore[arg-type]
-    if array.ndim != 1 or not array.size:
-        remedy = "give one number per cable, or a dict by the names of cables."
-        raise InvalidInput(name, f"shape {array.shape} given; {remedy}")
-    return tuple(array.tolist())
+    return row_of_numbers(name, value, "one number per cable, or a dict by the names of cables")
