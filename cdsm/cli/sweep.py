@@ -11,7 +11,6 @@ import cdsm
 from cdsm.cli import options
 from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse, write_picture
-from cdsm.quantities import names_of
 
 if TYPE_CHECKING:
     import xarray
@@ -30,7 +29,13 @@ _PLANE += "[mm]; without one, a twentieth of the arm's length."
 _ALONG = "Direction of along and payload, such as -y; default: x, y and z."
 _WORST = "Keep all segments within the bounds, whatever loads came before."
 _DIAMETER = "Of all cables, for clearances; default: that of a wire of the catalogue."
-_OUTPUTS = f"Quantities of the table: {', '.join(names_of('sweep'))}."
+
+
+def _outputs() -> str:
+    """Return the help of --outputs, when it is asked for."""
+    from cdsm.quantities import names_of  # slow to import
+
+    return f"Quantities of the table: {', '.join(names_of('sweep'))}."
 
 
 def sweep_postures(
@@ -48,7 +53,7 @@ def sweep_postures(
     direction: Annotated[str | None, opt(_ALONG, "AXIS|X,Y,Z")] = None,
     worst_friction: Annotated[bool, opt(_WORST, None, "--worst-friction")] = False,
     diameter: Annotated[float | None, opt(_DIAMETER, "MM", min=0.0)] = None,
-    outputs: Annotated[str | None, opt(_OUTPUTS, "NAME,...")] = None,
+    outputs: Annotated[str | None, opt(_outputs(), "NAME,...")] = None,
     store: Annotated[
         Path | None, opt("Keeps what is done; a stopped sweep resumes.", "FOLDER")
     ] = None,
