@@ -19,6 +19,7 @@ from cdsm.geometry import Geometry
 from cdsm.joint_springs import SpringOfJoint, Springs, springs_of
 from cdsm.limits import beyond_limits, require_within_limits
 from cdsm.motors import Motors
+from cdsm.pulleys.wraps import Wraps, placed
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import SHORTEST_SEGMENT, Routing
 from cdsm.segments import Chains
@@ -27,7 +28,6 @@ from cdsm.support.format import JointUnits, one_unit, plural
 from cdsm.support.validation import flag, vector
 from cdsm.support.values import Array, Printed, frozen
 from cdsm.tolerances import Tolerances
-from cdsm.wraps import Wraps, placed
 
 _FAR = 2.0 * math.pi  # angles [rad] or ways [m] up to which functions of springs are checked
 

@@ -24,6 +24,12 @@ from cdsm.support.validation import (
 )
 from cdsm.support.values import Array
 
+SURFACE = 1e-9
+"""Distance from a pulley's surface [m] below which a point is on it: a free piece has no length.
+
+Rounding of √(R² − r²) would be as long, and its direction would be noise.
+"""
+
 
 @final
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ from typing import Any, Final, Literal, NamedTuple, TypeVar
 import numpy as np
 
 from cdsm.cable import Cable
-from cdsm.cable_path import Pulley, Site
-from cdsm.contacts import SURFACE
+from cdsm.cable_path import SURFACE, Pulley, Site
 from cdsm.geometry import CableRoute, Joint, Link
 from cdsm.motors import Motor
 from cdsm.quantities import DISPLAY

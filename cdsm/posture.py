@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike
 from cdsm.cable_path import positions
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry.parts import overlapping
+from cdsm.pulleys.wrap_table import WrapTable, wrap_table
+from cdsm.pulleys.wrapping import Wrapping
 from cdsm.routing import Routing, Spans
 from cdsm.segments import Segments
 from cdsm.support.format import aligned, coordinates, merged, prepare_json
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, ReadOnlyState, draw, frozen
-from cdsm.wrap_table import WrapTable, wrap_table
-from cdsm.wrapping import Wrapping
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -98,7 +98,7 @@ class Routing:
 
     @classmethod
     def of(cls, body: RigidBody, cables: Sequence[Cable], *, every: bool = False) -> Self:
-        """Route cables through their sites; :mod:`cdsm.wraps` routes those over pulleys.
+        """Route cables through their sites; :mod:`cdsm.pulleys.wraps` routes those over pulleys.
 
         With ``every``, segments within one body count as segments.
 

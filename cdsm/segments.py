@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from cdsm.cable import Cable
 from cdsm.cable_laws import CableLaws
 from cdsm.cable_path import Site
+from cdsm.pulleys.wrapped_segments import STRAIGHT, ChainPaths, Curvature, Lengths
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import Indices, Routing, Spans, cross, dot
 from cdsm.support.values import Array, ReadOnlyState, frozen
-from cdsm.wrapped_segments import STRAIGHT, ChainPaths, Curvature, Lengths
 
 
 @final

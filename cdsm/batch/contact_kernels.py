@@ -1,6 +1,6 @@
 """Kernel of cables over pulleys: their contacts at many postures.
 
-The formulas are those of :mod:`cdsm.contacts`, for W postures side by side as in
+The formulas are those of :mod:`cdsm.pulleys.contacts`, for W postures side by side as in
 :mod:`cdsm.batch.kernels`. Which pulleys touch is known or assumed: it is the same in all postures.
 So nothing branches, and the compiler vectorises the tangents too.
 
@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdsm.contacts import BESIDE, INSIDE, STILL, SURFACE, SWEEPS
+from cdsm.cable_path import SURFACE
+from cdsm.pulleys.contacts import BESIDE, INSIDE, STILL, SWEEPS
 from cdsm.support.values import Array
 
 COMPILED = bool(globals().get("COMPILED", True))

@@ -44,7 +44,7 @@ class ContactArrays(NamedTuple):
     angle: Array  # Φ (B, T, W) [rad]
     slope: Array  # tan γ of the helix (B, T, W)
     arc: Array  # wrapped length (B, T, W) [m]
-    fault: Array  # outcome of each pulley, as in cdsm.contacts (B, T, W)
+    fault: Array  # outcome of each pulley, as in cdsm.pulleys.contacts (B, T, W)
     unsettled: Array  # 1 where contacts of a run do not converge (B, W)
     site: Array  # sites of the routing in their frames (B, P, 3, W) [m]
     fixed: Array  # length of cables that no joint changes (B, C, W) [m]

@@ -1,6 +1,6 @@
 """Kernel of cables over grooved pulleys: what contacts shift beside the planes of the grooves.
 
-The formulas are those of :mod:`cdsm.contact_shifts`, for W postures side by side as in
+The formulas are those of :mod:`cdsm.pulleys.contact_shifts`, for W postures side by side as in
 :mod:`cdsm.batch.kernels`. K_A and K_B act across the piece, symmetric and without trace, and so
 does their sum K: K² = k² there, and N D = (ℓ D − K D)/(ℓ² − k²) without its part along the piece.
 """
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdsm.contact_shifts import IN_PLANE
+from cdsm.pulleys.contact_shifts import IN_PLANE
 from cdsm.support.values import Array
 
 COMPILED = bool(globals().get("COMPILED", True))

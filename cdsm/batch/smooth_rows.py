@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.contact_shifts import Shifts
 from cdsm.manipulator import Manipulator
+from cdsm.pulleys.contact_shifts import Shifts
+from cdsm.pulleys.wraps import Pattern
 from cdsm.routing import Routing, Spans
 from cdsm.support.values import Array
-from cdsm.wraps import Pattern
 
 
 class Directions(NamedTuple):

@@ -29,12 +29,12 @@ from cdsm.batch.rows import (
     side_by_side,
     tables_of,
 )
-from cdsm.contacts import TOUCHES, Contacts, Pulleys, settle_postures, settle_row
 from cdsm.manipulator import Manipulator
+from cdsm.pulleys.contacts import TOUCHES, Contacts, Pulleys, settle_postures, settle_row
+from cdsm.pulleys.wraps import Wraps
 from cdsm.routing import Indices
 from cdsm.status import Status
 from cdsm.support.values import Array
-from cdsm.wraps import Wraps
 
 Solve = Callable[[Rows, int], tuple[dict[str, Array], Codes]]
 

@@ -13,12 +13,12 @@ from cdsm.cable import Cable
 from cdsm.cable_laws import group_by_law
 from cdsm.motors import refuse_rough
 from cdsm.posture import Posture
+from cdsm.pulleys.wrapped_segments import STRAIGHT
 from cdsm.routing import Indices
 from cdsm.stiffness_matrix import FrictionState, Stiffness, assemble_stiffness
 from cdsm.support.values import Array, Flags, frozen, total
 from cdsm.tension import Tension
 from cdsm.wires.elasticity import Elasticity
-from cdsm.wrapped_segments import STRAIGHT
 
 _STEPS = 60  # most Newton steps: linear laws need one, strands 3 to 6
 _UNDAMPED = 20  # full Newton steps; later ones are shortened, since full ones may cycle at a kink

@@ -7,7 +7,7 @@ import pytest
 
 import cdsm
 from cdsm import Pulley, Site
-from cdsm.contacts import (
+from cdsm.pulleys.contacts import (
     BESIDE,
     TOUCHES,
     UNSETTLED,

@@ -1,11 +1,12 @@
 """Cables over pulleys: which pulleys they touch and where, their lengths, J_L and H_L.
 
-:mod:`cdsm.contacts` finds the contacts. Then a cable is a polyline again, through its sites and its
-contacts, and :class:`~cdsm.routing.Routing` computes it as if the contacts were holes of the links:
+:mod:`~cdsm.pulleys.contacts` finds the contacts. Then a cable is a polyline again, through its
+sites and its contacts, and :class:`~cdsm.routing.Routing` computes it as if the contacts were holes
+of the links:
 
 - L is stationary in the places of its contacts, so J_L is exact. An arc adds its length r Φ/cos γ.
-- H_L is exact in the plane of the pulley. Beside it :mod:`cdsm.contact_shifts` adds what follows
-  from the shifts of the contacts.
+- H_L is exact in the plane of the pulley. Beside it :mod:`~cdsm.pulleys.contact_shifts` adds
+  what follows from the shifts of the contacts.
 
 Which pulleys touch is a pattern. An arm meets few patterns; the routing of each is built once.
 """
@@ -23,24 +24,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable, Cables
-from cdsm.cable_path import JointPulley, Pulley, Sheath, positions
-from cdsm.contact_shifts import Ends
-from cdsm.contacts import (
+from cdsm.cable_path import SURFACE, JointPulley, Pulley, Sheath, positions
+from cdsm.errors import InvalidInput, listed
+from cdsm.pulleys.contact_shifts import Ends
+from cdsm.pulleys.contacts import (
     BESIDE,
     INSIDE,
-    SURFACE,
     TOUCHES,
     UNSETTLED,
     Contacts,
     Pulleys,
     settle_row,
 )
-from cdsm.errors import InvalidInput, listed
+from cdsm.pulleys.wrapping import Wrapping
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import SHORTEST_SEGMENT, Indices, Node, Routing, located
 from cdsm.status import Status
 from cdsm.support.values import Array, frozen
-from cdsm.wrapping import Wrapping
 
 _PATTERNS = 64  # routings that an arm keeps, of the patterns that it met last
 
@@ -245,7 +245,7 @@ class Wraps:
         return entries
 
     def fault(self, outcome: int, pulley: int) -> InvalidInput:
-        """Return the error of an outcome of :func:`~cdsm.contacts.settle_row` at a pulley."""
+        """Return the error of an outcome of :func:`~cdsm.pulleys.contacts.settle_row` there."""
         cable, label = self.label(pulley)
         message = (
             f"{label}: {_FAULTS[outcome]} at this posture. Move the pulley or its neighbours, "

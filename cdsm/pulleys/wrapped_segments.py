@@ -27,11 +27,11 @@ import numpy as np
 from cdsm.cable import Cable
 from cdsm.cable_path import Pulley, Sheath, Site
 from cdsm.errors import InvalidInput
+from cdsm.pulleys.wrapping import Wrapping
+from cdsm.pulleys.wraps import Wraps
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import Indices, cross, dot
 from cdsm.support.values import Array, frozen
-from cdsm.wrapping import Wrapping
-from cdsm.wraps import Wraps
 
 STRAIGHT = 1e-9
 """Wrap angle [rad] below which a cable counts as straight in a hole: the angle is rounding."""

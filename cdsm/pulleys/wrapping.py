@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable_path import Pulley, positions
-from cdsm.contact_shifts import Shifts
-from cdsm.contacts import Contacts
+from cdsm.pulleys.contact_shifts import Shifts
+from cdsm.pulleys.contacts import Contacts
 from cdsm.routing import Spans
 from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
-    from cdsm.wraps import Pattern, Wraps
+    from cdsm.pulleys.wraps import Pattern, Wraps
 
 _ARC_STEP = math.radians(10.0)  # angle between points that draw an arc
 _NEAR = math.radians(0.1)  # wrap angle at which a remark says that the cable may lift off

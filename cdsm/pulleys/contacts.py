@@ -46,6 +46,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.cable_path import SURFACE
 from cdsm.support.values import Array
 
 TOUCHES = 0
@@ -59,12 +60,6 @@ BESIDE = 2
 
 UNSETTLED = 3
 """Outcome: the contacts of pulleys in a row do not converge."""
-
-SURFACE = 1e-9
-"""Distance from the surface [m] below which a point is on it: its free piece has no length.
-
-Rounding of √(R² − r²) would be as long, and its direction would be noise.
-"""
 
 STILL = 1e-13
 """Motion of the contacts [m] that is still to come when they count as settled."""
