@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -25,7 +25,7 @@ from cdsm.routing import SHORTEST_SEGMENT, Routing
 from cdsm.segments import Chains
 from cdsm.status import Status
 from cdsm.support.format import JointUnits, one_unit, plural
-from cdsm.support.validation import flag, vector
+from cdsm.support.validation import flag, one_of, vector
 from cdsm.support.values import Array, Printed, frozen
 from cdsm.tolerances import Tolerances
 
@@ -101,7 +101,10 @@ class ComputedArm(Printed):
         return type(self).of, (self.definition,)
 
     def replace(self, **changes: Any) -> Self:
-        """Return an arm with other values of its :class:`ArmDefinition`."""
+        """Return an arm with other values of its definition; InvalidInput if it has no such."""
+        known = [value.name for value in fields(self.definition)]
+        for name in changes:
+            one_of("value of an arm", name, known)
         return self.of(replace(self.definition, **changes), self)
 
     def with_forced(self, forced: NDArray[np.bool_]) -> Self:

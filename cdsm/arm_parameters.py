@@ -11,7 +11,7 @@ from cdsm.cable import holes_like, require_own_cables, serpentine_cables
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.parameters import PARAMETERS, Parameter, PartKind
-from cdsm.support.validation import instance, one_of, scalar, text
+from cdsm.support.validation import instance, one_of, scalar, sequence_of, text
 
 Place = tuple[PartKind, int]
 """PartKind of a part of an arm, and its index among them."""
@@ -62,7 +62,8 @@ class ArmParameters:
 
     def __post_init__(self) -> None:
         instance("arm", self.arm, Manipulator)
-        object.__setattr__(self, "names", tuple(text("names", name) for name in self.names))
+        names = sequence_of("names", self.names, str)
+        object.__setattr__(self, "names", tuple(text("names", name) for name in names))
         if self.arm.is_serpentine:
             require_own_cables(self.arm.geometry, self.arm.cables)
         free = dict[tuple[str, Place], str]()

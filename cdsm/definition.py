@@ -22,6 +22,7 @@ from cdsm.support.validation import (
     gravity_vector,
     instance,
     sequence_of,
+    text,
 )
 from cdsm.support.values import Array
 from cdsm.tolerances import Tolerances
@@ -123,7 +124,10 @@ class ArmDefinition:
         names = self.joint_names
         cables = _checked_cables(self.cables)
         no_motors = isinstance(self.motors, (list, tuple)) and not self.motors
+        if self.geometry is not None:
+            instance("geometry", self.geometry, Geometry)
         checked = {
+            "urdf": text("urdf", self.urdf),
             "cables": cables,
             "gravity": tuple(gravity.tolist()),
             "joint_names": None if names is None else sequence_of("joint_names", names, str),

@@ -28,6 +28,7 @@ from cdsm.support.validation import instance, number_array, whole_number
 from cdsm.support.values import Array, IndexedByName, ReadOnlyState, frozen
 from cdsm.tension import distribute_tension
 
+_JOBS = 1000  # processes at most
 _SAME = 1e-6  # relative difference of a quantity of the same design, computed on another machine
 
 
@@ -206,7 +207,7 @@ def workers(
 
     The function uses ``jobs`` processes, and moves the bar.
     """
-    whole_number("jobs", jobs, 1)
+    whole_number("jobs", jobs, 1, _JOBS)
     compute = partial(measure, problem)
     with progress_bar("designs", total, wanted=progress) as advance:
 

@@ -18,6 +18,7 @@ from cdsm.errors import need
 from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array, frozen
 
+_MOST = 10_000  # generations, and designs of one
 _NO_VALUE = 1e3  # stands for a violation or an objective that does not exist
 
 
@@ -59,8 +60,8 @@ def search_designs(
         8 designs, 4 feasible, 3 on the front; * is the compromise
     """
     instance("problem", problem, DesignProblem)
-    steps = whole_number("generations", generations, 1)
-    size = whole_number("population", population, 4)
+    steps = whole_number("generations", generations, 1, _MOST)
+    size = whole_number("population", population, 4, _MOST)
     whole_number("seed", seed, 0)
     need("design", "pymoo")
     rows: list[Array] = []

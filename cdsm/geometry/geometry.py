@@ -23,7 +23,7 @@ from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
 from cdsm.geometry.uniform import Hinged, Rolling, Universal, same_angle, spread_out
 from cdsm.springs import SpringLaw, law_table
 from cdsm.support import records, validation
-from cdsm.support.files import read_text, write_text
+from cdsm.support.files import as_path, read_text, write_text
 from cdsm.support.format import plural
 from cdsm.support.records import CrossFaults, read_toml, record, toml_text
 from cdsm.support.validation import WIDEST, doubts_about_angle, doubts_about_units, instance
@@ -314,7 +314,7 @@ class Geometry(Printed):
             if "urdf" in rest and not data:
                 raise GeometryError(["urdf: a robot has no geometry; use Manipulator.read"])
             described = data or rest
-            stem = "" if source is None else Path(source).stem
+            stem = "" if source is None else as_path(source).stem
             return toml.build(toml.called(described, stem))
         except GeometryError as error:
             raise GeometryError(error.faults, source) from None

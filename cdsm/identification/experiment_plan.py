@@ -28,6 +28,8 @@ from cdsm.support.validation import (
 )
 from cdsm.support.values import Array, Plotted, frozen
 
+_TESTS = 10_000  # at most
+
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -211,7 +213,7 @@ def plan_tests(
         raise InvalidInput("parameters", f"{parameters!r} given; {remedy}")
     values = np.array([scalar(f"parameters[{name!r}]", x) for name, x in parameters.items()])
     names = tuple(parameters)
-    most = whole_number("tests", tests, 1)
+    most = whole_number("tests", tests, 1, _TESTS)
     if not values.all():
         remedy = "0 given; intervals are judged relative to the expected value. Give a small one "
         remedy += "(commands: --start)."

@@ -102,6 +102,10 @@ def fit_parameters(
 ) -> Identification:
     """Fit parameters as :func:`identify` does; without ``other_starts`` a refused χ² is kept."""
     check_measurements(measurements)
+    function: object = tension_of
+    if not (function is None or callable(function)):
+        wanted = "give a function of posture, measurement and parameters."
+        raise InvalidInput("tension_of", f"{tension_of!r} given; {wanted}")
     bounds = _checked_bounds(free)
     informative = independent_readings(measurements)
     if informative < len(bounds):

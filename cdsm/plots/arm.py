@@ -164,8 +164,9 @@ def plot_arms(
         >>> panels.size
         2
     """
-    if not cases:
-        raise InvalidInput("cases", "is empty; give a posture, or more.")
+    if not isinstance(cases, (list, tuple)) or not cases:
+        problem = f"{cases!r} given; give a list of (posture, tension, stiffness, title), one or "
+        raise InvalidInput("cases", f"{problem}more, of which all but the posture may be left out.")
     rows = [(*case, None, None, None)[:4] for case in cases]
     scenes = [_scene(pose, tension, stiffness) for pose, tension, stiffness, _ in rows]
     chosen = style.panels(axs, len(rows), height=2.4)

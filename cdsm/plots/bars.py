@@ -15,11 +15,11 @@ from cdsm.plots import style
 from cdsm.support.format import stiffness_text, stiffness_unit
 from cdsm.support.validation import instance, scalar
 from cdsm.support.values import Array
+from cdsm.tension import Tension
 
 if TYPE_CHECKING:
     from cdsm.planning.plan import StiffnessPlan
     from cdsm.stiffness_matrix import Shares
-    from cdsm.tension import Tension
 
 _SAME = 1e-9  # largest difference between the entries of two equal unit directions
 _BAR = 0.74  # thickness of a bar, over the distance of two rows
@@ -175,7 +175,7 @@ def _tension_bars(
     tension: Tension, ax: Axes | None, breaking: float | None
 ) -> tuple[Axes, Array, float]:
     """Draw bars of tensions with their numbers; return panel, rows and the largest one [N]."""
-    F = tension.values
+    F = instance("tension", tension, Tension).values
     panel, y = _rows(ax, tension.posture.arm.cables.names)
     bars = panel.barh(y, F, _BAR, color=style.tension_colors(F).to_rgba(F), zorder=2)
     for bar, name in zip(bars, tension.keys(), strict=True):

@@ -56,6 +56,9 @@ def plot_stiffness_ranges(
         >>> len(cdsm.plots.plot_stiffness_ranges({"straight": ranges}).lines) > 0
         True
     """
+    rows: object = ranges
+    if not isinstance(rows, Mapping):
+        raise InvalidInput("ranges", f"{ranges!r} given; give a dict of lists of ranges.")
     every = [attainable for row in ranges.values() for attainable in row]
     for attainable in every:
         instance("ranges", attainable, StiffnessRange)

@@ -41,7 +41,7 @@ def progress_bar(
     ``total`` is the number of items, None if it is unknown. A bar that is opened while another one
     is open is never shown, even if the outer one is not ``wanted``.
     """
-    shown = wanted and _allowed.get() and sys.stderr.isatty()
+    shown = flag("progress", wanted) and _allowed.get() and sys.stderr.isatty()
     with progress_allowed(False):
         if not shown:
             yield lambda count: None

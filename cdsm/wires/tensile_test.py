@@ -101,7 +101,7 @@ def read_tensile_csv(
             raise InvalidInput(name, f"{pair!r} given; give two, of displacement and force.")
     if gauge_length is not None:
         checked_quantity("gauge_length", gauge_length, "length")
-    if decimal not in (None, ".", ","):
+    if not (decimal is None or (isinstance(decimal, str) and decimal in (".", ","))):
         raise InvalidInput("decimal", f"{decimal!r} given; it is '.' or ','.")
     sheet = _read_sheet(path, decimal)
     header = _find_header(sheet, columns)

@@ -153,6 +153,21 @@ CASES: dict[str, tuple[Callable[[], object], str]] = {
         ("way of two", lambda: K.shares((1.0, 0.0)), r"direction: .*shape \(2,\)"),
         ("term", lambda: K.pseudoinverse("activ"), "'activ'.*did you mean 'active'?.*passive"),  # type: ignore[arg-type]
         ("cables None", lambda: ARM.with_cables(None), "cables: none given"),  # type: ignore[arg-type]
+        ("a key of an arm", lambda: ARM.replace(gravty="z"), "'gravty'; did you mean 'gravity'"),
+        ("urdf", lambda: ARM.replace(urdf=3), "urdf: 3 given"),
+        ("a geometry", lambda: ARM.with_geometry(3, ARM.cables), "geometry: 3 given"),  # type: ignore[arg-type]
+        ("names", lambda: cdsm.ArmParameters(ARM, None), "names: None given; a list or tuple"),  # type: ignore[arg-type]
+        (
+            "bars",
+            lambda: cdsm.plots.plot_tensions(None),
+            "tension: None given; a Tension is needed",
+        ),  # type: ignore[arg-type]
+        ("arms", lambda: cdsm.plots.plot_arms(3), "cases: 3 given; give a list"),  # type: ignore[arg-type]
+        (
+            "ranges",
+            lambda: cdsm.plots.plot_stiffness_ranges(None),
+            "ranges: None given; give a dict",
+        ),  # type: ignore[arg-type]
         ("pushed wire", lambda: STEEL.strain(-1.0), "-1 N: outside the domain .* minimum of 0 N"),
         ("file a number", lambda: cdsm.Manipulator.read(3), "path: 3 given; the path of a file"),  # type: ignore[arg-type]
         ("changes", read(changes=[1]), r"changes: \[1\] given; give a dict of values by keys"),
