@@ -39,6 +39,17 @@ def margin(K: Array) -> Array:
     return np.asarray(np.linalg.eigvalsh((K + _transposed(K)) / 2.0)[..., 0])
 
 
+def least_real_part(K: Array) -> tuple[float, Array]:
+    """Compute the smallest real part of the eigenvalues of K_θ (n, n), and its motion (n,).
+
+    Where cables slide K_θ is not symmetric, and this decides if the arm comes back.
+    """
+    values, vectors = np.linalg.eig(K)
+    k = int(values.real.argmin())
+    motion = vectors[:, k].real
+    return float(values[k].real), np.asarray(motion / (np.linalg.norm(motion) or 1.0))
+
+
 def invert(K: Array, magnitudes: Array) -> tuple[Array, Mask]:
     """Compute K_θ⁻¹ (..., n, n), and where K_θ is singular (...).
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cdsm import readings
 from cdsm.applied import Applied, Loaded
 from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.load_texts import described, texts
@@ -29,6 +30,7 @@ from cdsm.stiffness_matrix.verdict import (
     find_doubts,
     find_excess,
     find_imbalance,
+    find_skewness,
     find_slack,
     find_stops,
     imbalance_of,
@@ -159,8 +161,11 @@ class Equilibrium(Result, Loaded):
 
         It is False for a neutral state, for example if all cables are slack. A joint that touches
         its stop without a torque counts as free, even if this stop blocks the unstable motion.
+        Where cables slide, it is enough that the eigenvalues of K_θ have positive real parts.
         """
         values = self._motions[0]
+        if self._skews:
+            return readings.least_real_part(self._stiffness)[0] > 0.0
         return bool((values > 1e-2 * NEUTRAL * abs(values).max(initial=0.0)).all())
 
     @quantity("1")
@@ -172,7 +177,7 @@ class Equilibrium(Result, Loaded):
         axis; the small stiffness of a model of it is that of its joints, and holds nothing.
         """
         values, vectors = self._motions
-        if not values.size:
+        if not values.size or self._skews:
             return False
         motion = np.zeros(len(self.stiffness.joint))
         motion[self._free] = vectors[:, 0]
@@ -208,6 +213,8 @@ class Equilibrium(Result, Loaded):
         elif self.neutral:
             sentence = "NEUTRAL: a motion of the joints meets hardly any resistance"
             yield Finding(Status.NEUTRAL, sentence)
+        elif self._skews:
+            yield from find_skewness(self._stiffness, arm)
         yield from find_stops(arm, self.at_limit)
         yield from find_doubts(self.pose)
         imbalance = imbalance_of(self.pose, self.tension, self.applied, self.residual)
@@ -270,10 +277,21 @@ class Equilibrium(Result, Loaded):
         """Indices (n,) of the joints that no stop pushes."""
         return np.flatnonzero(self.stop_torque == 0.0)
 
+    @property
+    def _stiffness(self) -> Array:
+        """K_θ of those joints (n, n)."""
+        return self.stiffness.joint[np.ix_(self._free, self._free)]
+
+    @property
+    def _skews(self) -> bool:
+        """Whether cables slide, and the symmetric part of K_θ is not positive definite."""
+        values = self._motions[0]
+        return self.stiffness.friction == "sliding" and bool(values.min(initial=1.0) <= 0.0)
+
     @cached_property
     def _motions(self) -> tuple[Array, Array]:
         """Eigenvalues of the symmetric part of K_θ of those joints, ascending, and vectors."""
-        K = self.stiffness.joint[np.ix_(self._free, self._free)]
+        K = self._stiffness
         values, vectors = np.linalg.eigh((K + K.T) / 2.0)
         return values, vectors
 

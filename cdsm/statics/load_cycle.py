@@ -30,6 +30,7 @@ from cdsm.statics.quasi_static import (
 )
 from cdsm.statics.slow_events import Way, slow_events
 from cdsm.stiffness_matrix import FrictionState, Stiffness, checked_tension
+from cdsm.stiffness_matrix.verdict import find_skewness
 from cdsm.support.files import write_file
 from cdsm.support.format import merged, prepare_json, without_rounding
 from cdsm.support.progress import show_progress
@@ -179,13 +180,20 @@ class LoadHistory(Result, Plotted):
     def _has_links(self) -> bool:
         return any(as_loads(applied).on_links for applied in self.applied)
 
-    @property
+    @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences with the loads at which the arm snaps through; empty if it never does.
+        """Sentences with the loads at which the arm snaps through, or a shock may move it.
 
         All states after a snap-through can depend on the sub-steps.
         """
-        return tuple(f"SNAPS THROUGH at load {k}" for k in np.flatnonzero(self.snaps).tolist())
+        snaps = [f"SNAPS THROUGH at load {k}" for k in np.flatnonzero(self.snaps).tolist()]
+        arm = self.arm
+        for k in self.load.tolist():
+            free = np.flatnonzero(self.stop_torque[k] == 0.0)
+            K = self.stiffness(k).joint[np.ix_(free, free)] if self.sliding[k].any() else None
+            found = () if K is None else find_skewness(K, arm)
+            snaps += [f"at load {k}, {finding.sentence}" for finding in found]
+        return tuple(snaps)
 
     @cached_property
     def tensions(self) -> tuple[Array, ...]:
@@ -345,7 +353,8 @@ def load_cycle(
             ``wrenches``, ``motors`` or ``substeps`` are not as above.
         ElasticityRangeError: A tension at the reference or at a load is outside the domain of its
             law.
-        EquilibriumError: No equilibrium was found in the step to a load. The error names the load.
+        EquilibriumError: No equilibrium was found in the step to a load. The error names the load,
+            and says so if cables slide, where `K_θ` is not symmetric.
 
     Example:
         >>> import cdsm

@@ -20,7 +20,8 @@ from cdsm.friction.capstan import ChainProblem, ChainState, chain_tangent
 from cdsm.motors import refuse_rough
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm, require_domain
-from cdsm.statics.solve import ArmState, Balance, Point, continued, settle
+from cdsm.statics.sliding import continued_sliding, settle_sliding
+from cdsm.statics.solve import ArmState, Balance, Point
 from cdsm.support.values import Array, frozen
 from cdsm.terms import stiffness_of, torque_of, torque_size_of
 
@@ -152,14 +153,14 @@ class QuasiStaticArm:
             f = self.balance(state, target)
             known = [near[goal]] if goal in near else []
             guesses = [*known, state.x + motion, state.x]
-            point: Point | None = continued(f, guesses, old.pose.q)
+            point: Point | None = continued_sliding(f, guesses, old.pose.q)
             jumps = point is None
             if point is None and goal - done > _SHORTEST:
                 part = (goal - done) / 2.0
                 motion = 0.0 * motion
                 continue
             if point is None:
-                point = settle(f, old.pose.q, done, what)
+                point = settle_sliding(f, old.pose.q, done, what)
                 snapped = True
             new = point.state
             assert isinstance(new, ChainArmState)

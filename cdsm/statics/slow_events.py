@@ -25,8 +25,8 @@ from cdsm.statics.quasi_static import (
     QuasiStaticState,
     Substep,
 )
+from cdsm.statics.sliding import continued_sliding
 from cdsm.statics.slow_watch import SlowStage, known_point, watched_slowly
-from cdsm.statics.solve import continued
 from cdsm.support.progress import show_progress
 from cdsm.support.values import Array, frozen
 
@@ -114,7 +114,7 @@ class _Walk:
 
         def near_points(share: float, guesses: list[Array]) -> SlowStage | None:
             f = self._arm.balance(self._state, action(share))
-            point = continued(f, [*guesses, self._state.x], self._state.arm_state.pose.q)
+            point = continued_sliding(f, [*guesses, self._state.x], self._state.arm_state.pose.q)
             return None if point is None else SlowStage(share, point, f)
 
         def solve(share: float, below: SlowStage, above: SlowStage) -> SlowStage | None:
@@ -246,7 +246,7 @@ def _within(
     def solve(share: float, below: SlowStage, above: SlowStage) -> SlowStage | None:
         f = arm.balance(part.before, part.before.load.interpolate(part.after.load, share))
         guesses = [*_guesses(share, below, above), part.before.x]
-        point = continued(f, guesses, part.before.arm_state.pose.q)
+        point = continued_sliding(f, guesses, part.before.arm_state.pose.q)
         return None if point is None else SlowStage(share, point, f)
 
     f = arm.balance(part.before, part.before.load)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, final
 
 import numpy as np
 
+from cdsm import readings
 from cdsm.applied import Applied, without_cables
 from cdsm.errors import listed
 from cdsm.posture import Posture
@@ -208,6 +209,23 @@ def find_doubts(pose: Posture) -> Iterator[Finding]:
             yield Finding(Status.SELF_CONTACT, remark, "the arm passes through itself")
 
 
+def find_skewness(K: Array, arm: Manipulator) -> Iterator[Finding]:
+    """Yield that a stable arm whose cables slide has a `K_θ` whose symmetric part is not positive.
+
+    Of the joints off their stops it is K (n, n).
+    """
+    work = float(readings.margin(K)) if K.size else 1.0
+    if work <= 0.0:
+        least = readings.least_real_part(K)[0]
+        unit = eigenvalue_unit(arm)
+        yield Finding(
+            Status.OK,
+            f"cables slide, so K_θ is not symmetric: all its eigenvalues are positive, {least:.4g} "
+            f"{unit} and more, so the arm follows slow loads, though its symmetric part has the "
+            f"eigenvalue {work:.4g} {unit}; inertia is left out",
+        )
+
+
 def describe_buckling(K: Stiffness) -> str:
     """Return a sentence about an unstable arm: which joint buckles most, and the margin."""
     sentence = f"UNSTABLE: the arm buckles, {weakest_joint(K)} most; {_eigenvalue(K)}"
@@ -266,6 +284,7 @@ def _instability(K: Stiffness) -> Iterator[Finding]:
     if not K.is_stable:
         yield Finding(Status.UNSTABLE, describe_buckling(K))
         return
+    yield from find_skewness(K.joint, K.posture.arm)
     if not K.slack:
         return
     cables = f"{listed(K.slack, 4)} at 0 N"
