@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, final
@@ -12,12 +13,15 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, warn
 from cdsm.locked_wires import LockedWires
 from cdsm.support.format import aligned
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import one_of, scalar, vector
 from cdsm.support.values import Array, frozen
+
+_TURN = 4.0  # [rad]; a turn beyond may be in degrees
+_WIRE = 0.2  # of the arm's length: so much wire bends the arm farther than most joints go
 
 
 class Driven(NamedTuple):
@@ -85,6 +89,18 @@ class Assembly(Result):
             commands[m] = scalar(f"motors[{name!r}]", value)
         return frozen(commands)
 
+    def _doubt_degrees(self, commands: Array) -> None:
+        """Warn of turns that take in much of the arm's length, as if they were in degrees."""
+        arm = self.posture.arm
+        for motor, turn in zip(arm.motors.given, commands.tolist(), strict=False):
+            cable, radius = max(motor.cables.items(), key=lambda drum: abs(drum[1]))
+            wire = abs(radius * turn)
+            held = motor.control == "position"
+            if held and abs(turn) > _TURN and wire > _WIRE * arm.length:
+                radians = f"np.deg2rad({turn:g}) is {math.radians(turn):.4g} rad"
+                moved = f"moves {1e3 * wire:.4g} mm of {cable}"
+                warn(f"motors: {motor.name} turned by {turn:g} rad {moved}. Degrees? {radians}.")
+
     def driven(self, commands: Array) -> Driven:
         """Return what checked commands (M,) make of the wires."""
         arm = self.posture.arm
@@ -108,13 +124,15 @@ class Assembly(Result):
         c = int(driven.rest_length.argmin())
         if driven.rest_length[c] <= 0.0:
             left = f"leave {driven.rest_length[c]:.4g} m of {arm.cables.names[c]}"
-            raise InvalidInput("motors", f"{left}, which is {self.free_lengths[c]:.4g} m long.")
+            problem = f"{left}, which is {self.free_lengths[c]:.4g} m long. Take in less, or, in "
+            raise InvalidInput("motors", f"{problem}Python, give turns in radians, not in degrees.")
         arm.cables.require_pulling("motors", driven.tension)
         for motor, torque in zip(arm.motors.given, commands, strict=False):
             if motor.control == "torque" and not motor.can_give(float(torque)):
                 side = "0 or more" if torque < 0.0 else "0 or less"
                 problem = f"{torque:g} N m for {motor.name}, whose cables only pull: {side} is "
                 raise InvalidInput("motors", f"{problem}possible with its radii.")
+        self._doubt_degrees(commands)
 
     def wires(self, driven: Driven) -> LockedWires:
         """Return the wires of driven motors, as functions of the lengths of the cables."""

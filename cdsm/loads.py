@@ -14,7 +14,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.support.validation import one_of, wrench_vector
 
 LoadsLike = ArrayLike | Mapping[str, ArrayLike] | Sequence[Load] | Load | Loads
-"""A wrench (6,) at the tip; or wrenches by the names of links; or loads."""
+"""A wrench (6,) at the tip; or wrenches by the names of links; or loads; {} or []: none."""
 
 
 def link_point(arm: Manipulator, link: object, point: ArrayLike | None = None) -> LinkPoint | None:
@@ -77,7 +77,7 @@ def kept_loads(name: str, wrench: object) -> tuple[float, ...] | tuple[Load, ...
         return (wrench,)
     if isinstance(wrench, Mapping):
         return tuple(_loads_by_link(name, wrench))
-    if isinstance(wrench, (list, tuple)) and any(isinstance(load, Load) for load in wrench):
+    if isinstance(wrench, (list, tuple)) and has_loads(wrench):
         for load in wrench:
             if not isinstance(load, Load):
                 raise InvalidInput(name, f"{load!r} is no Load; give loads only.")
@@ -102,9 +102,13 @@ def _require_no_point(point: ArrayLike | None) -> None:
 
 
 def has_loads(value: object) -> bool:
-    """Return whether what acts is given as loads, or by links, and not as numbers."""
-    several = value if isinstance(value, (list, tuple)) else [value]
-    return any(isinstance(load, (Load, Loads, Mapping)) for load in several)
+    """Return whether what acts is given as loads, or by links, and not as numbers.
+
+    An empty list is no loads, as an empty dict is.
+    """
+    if isinstance(value, (list, tuple)):
+        return not value or any(isinstance(load, (Load, Loads, Mapping)) for load in value)
+    return isinstance(value, (Load, Loads, Mapping))
 
 
 def _moved_to(arm: Manipulator, load: TipLoad | PointLoad) -> TipLoad | PointLoad:

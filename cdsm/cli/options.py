@@ -65,6 +65,10 @@ _TENSION = "Tension [N] that each motor holds; the posture follows. One each, or
 _TENSION += "(cable1_1=20,…; others are loose)."
 TensionOption = Annotated[str | None, opt(_TENSION, "N,...", "--tension")]
 PullOption = Annotated[str | None, opt(_PULL, "MM,...")]
+_MOTORS = "How far motors turn [deg] from their assembly, by name (m1=20,m2=-5; others 0); torque "
+_MOTORS += "[N m] of those that hold one; mm or N of a cable's own. The posture follows. Assembled "
+_MOTORS += "at --angles with the least tensions there; without --angles, cables are just straight."
+MotorsOption = Annotated[str | None, opt(_MOTORS, "NAME=DEG,...", "--motors")]
 MinimumOption = Annotated[
     float, opt("Lower bound of all tensions [N], besides those of ARM.toml.", "N")
 ]
@@ -206,6 +210,22 @@ def by_cable(
     return {
         name: scale * parse_numbers(option, value, (1,), form)[0] for name, value in entries.items()
     }
+
+
+def by_motor(text: str, arm: cdsm.Manipulator) -> dict[str, float]:
+    """Return the commands of --motors in SI, by the names of motors."""
+    import math
+
+    motors = arm.motors
+    form = f"NAME=DEG,..., names of {', '.join(motors.names)}"
+    entries = by_name("--motors", text, "motor", motors.names, form)
+    commands = {}
+    for name, value in entries.items():
+        m = motors.names.index(name)
+        scale = math.radians(1.0) if m < len(motors.given) else 1e-3
+        scale = 1.0 if motors.holds_torque[m] else scale
+        commands[name] = scale * parse_numbers("--motors", value, (1,), form)[0]
+    return commands
 
 
 def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[str, str]:

@@ -34,6 +34,7 @@ def show_stiffness(
     maximum: options.MaximumOption = math.inf,
     tension: options.TensionOption = None,
     pull: options.PullOption = None,
+    motors: options.MotorsOption = None,
     load: options.LoadOption = None,
     mass: options.MassOption = None,
     direction: Annotated[str | None, opt("One more direction for it.", "AXIS|X,Y,Z")] = None,
@@ -47,9 +48,9 @@ def show_stiffness(
 ) -> int:
     """Compute the least tensions at a posture, and the stiffness.
 
-    With --tension or --pull, the posture and the tensions follow from what the motors do. With
-    [tolerances] in ARM.toml it also says how sure the numbers are; with friction, which stiffness
-    small loads measure.
+    With --tension, --pull or --motors, the posture and the tensions follow from what motors do.
+    With [tolerances] in ARM.toml it also says how sure the numbers are; with friction, which
+    stiffness small loads measure.
 
     Exit code 0; 3 if the arm is unstable, or the report of --check fails.
     """
@@ -58,7 +59,7 @@ def show_stiffness(
 
     robot = options.load_arm(arm, changes)
     wrench = options.loads_on(robot, load, mass)
-    K, rest = _balanced(robot, wrench, angles, minimum, maximum, tension, pull)
+    K, rest = _balanced(robot, wrench, angles, minimum, maximum, tension, pull, motors)
     friction = "followed along the path" if rest and rest.path else "ignored"
     head, numbers = header(K.posture, [] if rest else [minimum], friction, K.distribution)
     axes = {axis: options.parse_direction(axis) for axis in ("x", "y", "z")}
@@ -110,12 +111,25 @@ def _balanced(
     maximum: float,
     tension: str | None,
     pull: str | None,
+    motors: str | None,
 ) -> tuple[cdsm.Stiffness, Equilibrium | None]:
-    """Return K at --angles, or K and the equilibrium where --tension or --pull let the arm rest."""
+    """Return K at --angles, or K and the equilibrium where what the motors do lets the arm rest."""
+    posture = angles, minimum, maximum
+    if motors is not None:
+        if (tension, pull) != (None, None):
+            raise misuse("--motors, --tension, --pull", "each says what the motors do: give one.")
+        assembly = None
+        if posture != (None, 0.0, math.inf):
+            pose = arm.at(options.joint_coordinates(angles, arm))
+            assembly = arm.assemble(pose, cdsm.distribute_tension(pose, minimum, maximum))
+        rest = cdsm.forward_statics(
+            arm, motors=options.by_motor(motors, arm), assembly=assembly, wrench=wrench
+        )
+        return rest.stiffness, rest
     if tension is None and pull is None:
         pose = arm.at(options.joint_coordinates(angles, arm))
         return cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum, maximum, wrench)), None
-    if None not in (tension, pull) or (angles, minimum, maximum) != (None, 0.0, math.inf):
+    if None not in (tension, pull) or posture != (None, 0.0, math.inf):
         remedy = "say what the motors do, and the posture follows: give one of them, without "
         raise misuse("--tension, --pull", f"{remedy}--angles, --minimum and --maximum.")
     option, text = ("--tension", tension) if pull is None else ("--pull", pull)
@@ -206,6 +220,7 @@ def weigh(
     maximum: options.MaximumOption = math.inf,
     tension: options.TensionOption = None,
     pull: options.PullOption = None,
+    motors: options.MotorsOption = None,
     load: options.LoadOption = None,
     mass: options.MassOption = None,
     steps: Annotated[int | None, opt("Steps to the full load.", "N", min=1, max=1000)] = None,
@@ -218,10 +233,10 @@ def weigh(
 ) -> int:
     """Hang a weight at the tip, or on a link: how far it moves, and how much more the arm holds.
 
-    The motors are locked (Eq. 20), or go on as --tension or --pull say; --load and --mass are the
-    weight, in 5 steps (12 in each quarter of --cycles); it is read where it hangs. With friction in
-    the holes, small and large weights measure different stiffness, and --cycles, to the load and
-    its opposite, show the hysteresis.
+    The motors are locked (Eq. 20), or go on as --tension, --pull or --motors say; --load and --mass
+    are the weight, in 5 steps (12 in each quarter of --cycles); it is read where it hangs. With
+    friction in the holes, small and large weights measure different stiffness, and --cycles, to the
+    load and its opposite, show the hysteresis.
 
     Exit code 0; 3 if the arm does not stay at its posture without the weight, buckles under it, or
     snaps through.
@@ -234,14 +249,14 @@ def weigh(
 
     robot = options.load_arm(arm, changes)
     weights = _weights(robot, load, mass)
-    K, rest = _balanced(robot, [0.0] * 6, angles, minimum, maximum, tension, pull)
+    K, rest = _balanced(robot, [0.0] * 6, angles, minimum, maximum, tension, pull, motors)
     pose = K.posture
     start = rest or K.tension
     head, numbers = header(pose, [] if rest else [minimum], "included")
     held: Holding | None = None
     holds_tensions = rest is not None and rest.motors == "tension"
-    motors = "hold the tensions" if holds_tensions else "locked: they hold the wire"
-    head = f"motors {motors}\n{head}"
+    hold = "hold the tensions" if holds_tensions else "locked: they hold the wire"
+    head = f"motors {hold}\n{head}"
     numbers["motors"] = "tension" if holds_tensions else "locked"
     result: WeightTest | LoadHistory
     if cycles is not None:

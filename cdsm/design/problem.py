@@ -94,7 +94,7 @@ class DesignProblem(ReadOnlyState):
         if not variables or not objectives:
             raise InvalidInput("variables", "give one variable and one objective or more.")
         _require_compatible(variables, self.arm)
-        if has_loads(self.loads):
+        if has_loads(self.loads) and self.loads != []:
             problem = "designs take wrenches (n, 6) at the tip; loads on links that stay belong to "
             raise InvalidInput("loads", f"{problem}the arm: with_loads, [[loads]] in its ARM.toml.")
         loads = np.atleast_2d(number_array("loads", self.loads, "wrench"))

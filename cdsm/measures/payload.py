@@ -59,6 +59,7 @@ class Payload(Result, Loaded):
             are none.
         problem: Why no tensions balance the arm without the force; empty if some do.
         point: Where the force acts and the deflection is read; None: the tip.
+        deflection: Largest allowed displacement [m]; inf for no limit.
     """
 
     _headline = "force"
@@ -73,6 +74,7 @@ class Payload(Result, Loaded):
     tension: Array | None
     problem: str = ""
     point: LinkPoint | None = None
+    deflection: float = field(default=math.inf, metadata=unit("m"))
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -121,8 +123,9 @@ class Payload(Result, Loaded):
         cases = [str(case) for case in (self.following, self.locked) if case is not None]
         where = f", force on {self.point.link}" if self.point else ""
         lines = [*self.warnings, f"{which} {along}{where}", *cases]
-        if math.isfinite(self.limits["deflection"]) and not self.problem:
-            allowed = f"{self.limits['deflection']:.4g} N"
+        if math.isfinite(self.deflection) and not self.problem:
+            most = self.limits["deflection"]
+            allowed = f"{most:.4g} N" if most < math.inf else "any force, which moves nothing"
             lines.append(f"deflection allows {allowed} with locked motors, to first order")
         return "\n".join(lines)
 
@@ -197,6 +200,7 @@ def payload(
     high = bounds.maximum_held
     locked = None if tension is None else checked_tension(pose, tension, None)[0]
     case: Any = {"posture": pose, "applied": W, "minimum": low, "maximum": high, "point": at}
+    case["deflection"] = allowed
     try:
         least = distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
     except InfeasibleTension as error:

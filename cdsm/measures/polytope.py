@@ -98,6 +98,8 @@ class ForcePolytope(Result, Plotted, Loaded):
         corners = plural(len(self.vertices), "corner")
         direction = coordinates(self.worst_direction, ".3g")
         where = f" on {self.point.link}" if self.point else ""
+        if len(self.unbounded) == 3:  # a radius would be that of no facet
+            return f"holds any force{where}: no joint moves the place where it acts"
         holds = f"holds {self.radius:.4g} N{where} in any direction"
         return f"{corners}; {holds}, least along {direction}"
 

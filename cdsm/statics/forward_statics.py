@@ -265,7 +265,7 @@ def _model(
 ) -> Model:
     count = len(arm.cables)
     if name == "tension":
-        remedy = "Give motors=: turns [rad], or torques [N m] of motors that hold them."
+        remedy = "Give --motors, turns in degrees, or, in Python, motors=, turns [rad] or torques."
         refuse_shared(arm.motors, "tension", remedy)
         F, _ = checked_tension(home, value, None)
         return lambda share: LockedArm(begin, share * F, scaled(wrench, share), tension_held=True)
@@ -275,10 +275,12 @@ def _model(
             raise InvalidInput(name, f"{problem}Give tension, or this cable control='position'.")
     for motor in arm.motors.given:
         if motor.control == "torque":
-            problem = f"{motor.name} holds a torque, no length: give motors=, with its torque."
+            problem = f"{motor.name} holds a torque, no length: give --motors with its torque, or, "
+            problem += "in Python, motors=."
             raise InvalidInput(name, problem)
     if name == "pull":
-        remedy = "Give motors=, how far they turn [rad]: a drum that takes in one cable moves all."
+        remedy = "A drum that takes in one cable moves all: give --motors, how far they turn, in "
+        remedy += "degrees, or, in Python, motors=, in radians."
         refuse_shared(arm.motors, "pull", remedy, "lengths")
     least = np.array([cable.elasticity.rest for cable in arm.cables])
     straight = arm.laws.original_lengths(home.cable_lengths, least)

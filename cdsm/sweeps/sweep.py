@@ -145,9 +145,10 @@ def _cases_of(arm: Manipulator, value: Any) -> tuple[tuple[Applied, ...], Sequen
     """Return what acts in each case, and the names or numbers of cases; None: there is one."""
     links = {*arm.body.link_names}
     one = isinstance(value, (Load, Loads)) or (
-        bool(value) and {*value} <= links
+        {*value} <= links
         if isinstance(value, Mapping)
-        else isinstance(value, (list, tuple)) and any(isinstance(load, Load) for load in value)
+        else isinstance(value, (list, tuple))
+        and (not value or any(isinstance(load, Load) for load in value))
     )
     if one:
         return (loads_of(arm, value),), None

@@ -170,6 +170,31 @@ def test_a_load_at_the_tip_is_the_wrench_bit_by_bit(make: Callable[[], cdsm.Mani
     np.testing.assert_allclose(as_loads(spot).stiffness(pose), tip.stiffness(pose), atol=1e-14)
 
 
+@pytest.mark.parametrize("none", [{}, [], ()])
+def test_no_loads_are_an_empty_dict_or_list(none: Any) -> None:
+    """Wherever loads are taken beside other things; where one is needed, both are refused."""
+    arm = universal()
+    pose = arm.at(Q)
+    F = cdsm.distribute_tension(pose, 10.0)
+    np.testing.assert_array_equal(cdsm.distribute_tension(pose, 10.0, wrench=none).values, F.values)
+    K = cdsm.stiffness(pose, F)
+    np.testing.assert_array_equal(cdsm.stiffness(pose, F.values, wrench=none).joint, K.joint)
+    assert cdsm.payload(pose, "-z", 10.0, 400.0, none).force > 0.0
+    rows = cdsm.distribute_tensions(arm, Q[None], 10.0, wrench=none)
+    np.testing.assert_allclose(rows.values[0], F.values, atol=1e-9)
+    assert cdsm.evaluate(arm, Q[None], F.values, none).status[0] == cdsm.Status.OK
+    found = cdsm.sweep(arm, Q[None], minimum=10.0, wrench=none)
+    assert found.along.values.shape == cdsm.sweep(arm, Q[None], minimum=10.0).along.values.shape
+    for refused in (
+        lambda: cdsm.load_cycle(pose, F, none),
+        lambda: cdsm.critical_load(pose, none),
+    ):
+        with pytest.raises(cdsm.InvalidInput):
+            refused()
+    with pytest.raises(cdsm.InvalidInput, match=r"shape \(0,\)"):
+        cdsm.distribute_tension(pose, 10.0, wrench=np.zeros(0))
+
+
 def test_tensions_and_stiffness_of_an_arm_with_loads_on_its_links() -> None:
     pose = universal().at(Q)
     hung = [

@@ -129,6 +129,22 @@ def test_where_the_tip_cannot_move_the_links_hold_any_force() -> None:
     assert side.force == pytest.approx(polytope.radius, rel=1e-7)
 
 
+@pytest.mark.filterwarnings("ignore:no joint moves the point")
+def test_a_place_that_no_joint_moves_holds_any_force() -> None:
+    """Neither the deflection nor why the radius is infinite is dropped in silence."""
+    pose = cdsm.presets.virtual_prototype().at(np.full(10, 0.1))
+    still = cdsm.force_polytope(pose, 15.0, 800.0, link="link1")
+    assert str(still) == "holds any force on link1: no joint moves the place where it acts"
+    assert "corners; holds" in str(cdsm.force_polytope(pose, 15.0, 800.0, link="link3"))
+    held = cdsm.payload(pose, "z", 15.0, 800.0, link="link1", deflection=1e-3)
+    assert held.limits["deflection"] == np.inf
+    assert held.deflection == 1e-3
+    assert "deflection allows any force, which moves nothing" in str(held)
+    some = cdsm.payload(pose, "z", 15.0, 800.0, link="link3", deflection=1e-3)
+    assert f"deflection allows {some.limits['deflection']:.4g} N" in str(some)
+    assert "deflection" not in str(cdsm.payload(pose, "z", 15.0, 800.0, link="link1"))
+
+
 def test_a_balanced_arm_with_fewer_cables_than_joints_holds_no_force() -> None:
     arm = cdsm.presets.nitinol_segment(gravity=(0.0, 0.0, -9.81))
     random = np.random.default_rng(0)

@@ -1,6 +1,7 @@
 """Motors that are fewer than cables: what they can hold, and where the arm comes to rest."""
 
 import json
+import warnings
 from typing import Any
 
 import numpy as np
@@ -270,15 +271,15 @@ def test_bad_commands_and_assemblies_are_named() -> None:
         ),
         (
             lambda: cdsm.forward_statics(arm, pull=np.zeros(12)),
-            "pull: m1b holds a torque, no length: give motors=, with its torque",
+            "pull: m1b holds a torque, no length: give --motors with its torque, or, in Pyt",
         ),
         (
             lambda: cdsm.forward_statics(spooled(), pull={"cable1_1": 1e-3}),
-            "pull: lengths of 12 cables are not free: 8 motors move them. Give motors=, how far",
+            "pull: lengths of 12 cables are not free: 8 motors move them. .* give --motors,",
         ),
         (
             lambda: cdsm.forward_statics(arm, tension=np.ones(12)),
-            "tension: tensions of 12 cables are not free: 8 motors move them. Give motors=",
+            "tension: tensions of 12 cables are not free: 8 motors move them. Give --motors, turns",
         ),
         (
             lambda: cdsm.forward_statics(other, rest_lengths=np.ones(12), assembly=assembly),
@@ -294,7 +295,7 @@ def test_bad_commands_and_assemblies_are_named() -> None:
         ),
         (
             lambda: cdsm.forward_statics(arm, motors={"m1": 50.0}, assembly=assembly),
-            r"motors: leave -0\.2771 m of cable1_1, which is 0\.3229 m long",
+            r"motors: leave -0\.2771 m of cable1_1, which is 0\.3229 m long\. Take in less, or",
         ),
         (
             lambda: cdsm.forward_statics(arm, motors=np.zeros(12), assembly=assembly),
@@ -304,6 +305,21 @@ def test_bad_commands_and_assemblies_are_named() -> None:
     for call, message in cases:
         with pytest.raises(cdsm.InvalidInput, match=message):
             call()
+
+
+def test_turns_in_degrees_are_doubted() -> None:
+    arm = spooled(elasticity=SOFT)
+    assembly = assembled(arm, 60.0)
+    commands = np.zeros(len(arm.motors))
+    commands[2] = 15.0  # of 12 mm
+    said = r"m2 turned by 15 rad moves 180 mm of cable2_1\. Degrees\? np\.deg2rad\(15\) is 0\.2618"
+    with pytest.warns(cdsm.CdsmWarning, match=said):
+        cdsm.forward_statics(arm, motors=commands, assembly=assembly)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cdsm.forward_statics(arm, motors={"m2": 0.2618}, assembly=assembly)
+        thin = arm.with_motors([cdsm.Motor("worm", {"cable2_1": 0.0002, "cable2_2": -0.0002})])
+        cdsm.forward_statics(thin, motors={"worm": 15.0}, assembly=assembled(thin, 60.0))
 
 
 def test_an_assembly_prints_and_exports() -> None:

@@ -70,6 +70,35 @@ def test_commands_that_need_free_tensions_are_refused(path: Path, words: str) ->
     assert "tensions of 6 cables are not free: 5 motors move them" in text
 
 
+def test_stiffness_and_weigh_take_what_motors_are_told(path: Path) -> None:
+    """--motors is forward_statics(motors=), in degrees and mm, from an assembly at --angles."""
+    arm = cdsm.Manipulator.read(path)
+    pose = arm.at(np.full(4, np.deg2rad(3.0)))
+    assembly = arm.assemble(pose, cdsm.distribute_tension(pose, 40.0))
+    told_motors = {"m1": np.deg2rad(6.0), "cable2_3": 0.0005}
+    rest = cdsm.forward_statics(arm, motors=told_motors, assembly=assembly)
+    words = [path, "--motors", "m1=6,cable2_3=0.5", "--angles", 3, "--minimum", 40]
+    found = told("stiffness", *words)
+    np.testing.assert_allclose([*found["tension_N"].values()], rest.tension, rtol=1e-9)
+    np.testing.assert_allclose(found["along_N_per_m"], [rest.along(u) for u in "xyz"], rtol=1e-9)
+    assert found["motor_turn_rad"]["m1"] == np.deg2rad(6.0)
+    moved = told("weigh", *words, "--mass", 0.1)["displacements_m"][-1]
+    test = cdsm.weight_test(rest.pose, rest, [0.0, 0.0, -0.981])
+    np.testing.assert_allclose(moved, test.displacement, rtol=1e-6)
+    for wrong, said in (
+        (["--motors", "m1"], "--motors: 'm1' given; NAME=DEG,..., names of m1, cable1_3"),
+        (["--motors", "m9=5"], "no motor is called 'm9'"),
+        (["--motors", "m1=a"], "--motors: 'a' given"),
+        (["--motors", "m1=5,m1=6"], "--motors: m1 is given twice"),
+        (["--motors", "m1=5", "--pull", "cable1_1=5"], "each says what the motors do: give one"),
+    ):
+        result = call("stiffness", path, *wrong)
+        assert result.exit_code
+        assert said in " ".join(result.output.split())
+    refused = " ".join(call("stiffness", path, "--pull", "cable1_1=5").output.split())
+    assert "give --motors, how far they turn, in degrees." in refused
+
+
 def test_designs_are_refused_by_name() -> None:
     arm = spooled()
     variable = cdsm.Variable("hole_radius", 0.02, 0.03)
