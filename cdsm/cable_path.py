@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Literal, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.support.validation import (
@@ -139,6 +140,19 @@ class Pulley:
             friction=friction,
             bearing=bearing,
         )
+
+
+def unit_axis(pulley: Pulley) -> Array:
+    """Return the axis a (3,) of a pulley, of length 1."""
+    axis = np.array(pulley.axis)
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def off_axis(pulley: Pulley, points: ArrayLike) -> Array:
+    """Return the parts of the ways from the centre to points (…, 3) that are square to the axis."""
+    axis = unit_axis(pulley)
+    apart = np.subtract(points, pulley.position)
+    return np.asarray(apart - (apart @ axis)[..., None] * axis)
 
 
 @final

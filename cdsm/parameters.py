@@ -14,7 +14,7 @@ from typing import Any, Final, Literal, NamedTuple, TypeVar
 import numpy as np
 
 from cdsm.cable import Cable
-from cdsm.cable_path import SURFACE, Pulley, Site
+from cdsm.cable_path import SURFACE, Pulley, Site, off_axis
 from cdsm.geometry import CableRoute, Joint, Link
 from cdsm.motors import Motor
 from cdsm.quantities import DISPLAY
@@ -164,9 +164,7 @@ def _pulley_radius(cable: Cable) -> float | None:
 
 def _with_rim(pulley: Pulley, site: Site, more: float) -> Site:
     """Return a site of the link of a pulley, farther from its axis if the site is on its rim."""
-    axis = np.array(pulley.axis) / np.linalg.norm(pulley.axis)
-    apart = np.subtract(site.position, pulley.position)
-    out = apart - (axis @ apart) * axis
+    out = off_axis(pulley, site.position)
     far = float(np.linalg.norm(out))
     if abs(far - pulley.radius) > SURFACE:
         return site

@@ -19,7 +19,7 @@ from lxml import etree
 from numpy.typing import ArrayLike
 
 from cdsm.cable import Cable
-from cdsm.cable_path import Pulley, Sheath, Site
+from cdsm.cable_path import Pulley, Sheath, Site, off_axis, unit_axis
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
@@ -128,11 +128,9 @@ def side_sites(arm: Manipulator, q: Array) -> list[Side]:
 
 def _side(pulley: Pulley, arrival: Array, angle: Array) -> Side:
     """Return the side site from the arrivals (n, 3) and wrap angles (n,) at n postures."""
-    axis = np.array(pulley.axis) / np.linalg.norm(pulley.axis)
-    radial = arrival - np.array(pulley.position)
-    radial -= (radial @ axis)[:, None] * axis
+    radial = off_axis(pulley, arrival)
     first = radial[0] / np.linalg.norm(radial[0])
-    across = np.cross(axis, first)
+    across = np.cross(unit_axis(pulley), first)
     begin = np.arctan2(radial @ across, radial @ first)
     low = begin.min()
     high = (begin + np.maximum(angle, 0.0)).max()
@@ -182,9 +180,7 @@ def _outside(cable: Cable, i: int) -> Array:
     point = np.array(site.position)
     for pulley in cable.sites[max(i - 1, 0) : i + 2]:
         if isinstance(pulley, Pulley) and pulley.link == site.link:
-            axis = np.array(pulley.axis) / np.linalg.norm(pulley.axis)
-            apart = point - np.array(pulley.position)
-            radial = apart - (axis @ apart) * axis
+            radial = off_axis(pulley, point)
             least = (1.0 + _OUTSIDE) * pulley.radius
             distance = float(np.linalg.norm(radial))
             if distance < least:
