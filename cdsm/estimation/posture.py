@@ -259,38 +259,10 @@ def estimate_posture(
     """
     instance("arm", arm, Manipulator)
     W = loads_of(arm, wrench)
-    begin: ArrayLike
-    if start is None:
-        F0 = vector("motor_tensions", motor_tensions, len(arm.cables), "one reading [N] per cable")
-        begin = forward_statics(
-            arm, tension=np.maximum(F0, 0.0), wrench=wrench, friction=False
-        ).pose.q
-    else:
-        begin = vector("start", start, arm.nv, "one angle per joint")
-    pose = arm.at(begin, check_limits=False)
+    pose = _begin(arm, motor_tensions, wrench, start)
     readings = checked_readings(pose, motor_tensions, tension_std, 0.0, sliding, NO_WRENCH)
-    wires = None
-    if rest_lengths is not None:
-        wire = vector(
-            "rest_lengths", rest_lengths, len(arm.cables), "one length [m] per cable", "length"
-        )
-        of_wire = _WIRE_STD if rest_length_std is None else rest_length_std
-        names = arm.cables.names
-        wires = wire, spread("rest_length_std", of_wire, names, "length", "a wire is not exact")
-    elif rest_length_std is not None:
-        raise InvalidInput("rest_length_std", "is of rest_lengths, which are not given.")
-    seen: Any = {} if points is None else points
-    if not isinstance(seen, Mapping):
-        wanted = "give a dict of positions (3,) [m] by the names of links."
-        raise InvalidInput("points", f"{points!r} given; {wanted}")
-    if not seen and point_std is not None:
-        raise InvalidInput("point_std", "is of points, which are not given.")
-    tracked = [
-        _Point(
-            link_point(arm, link), vector(f"points[{link!r}]", x, 3, "a point (3,) [m]", "length")
-        )
-        for link, x in seen.items()
-    ]
+    wires = _wires(arm, rest_lengths, rest_length_std)
+    tracked = _tracked(arm, points, point_std)
     problem = _Problem(
         pose,
         readings.motor_tension,
@@ -306,20 +278,72 @@ def estimate_posture(
         problem.residuals, x, problem.jacobian, method="lm", xtol=_TOLERANCE, ftol=_TOLERANCE,
         gtol=_TOLERANCE, x_scale="jac",
     )  # fmt: skip
-    there, T = problem.at(solved.x)
-    left = problem.residuals(solved.x)
-    nv = arm.nv
-    if not solved.success or abs(left[:nv]).max() > 1.0:
-        missing = left[:nv] * problem.exact
+    missing = problem.residuals(solved.x)[: arm.nv]
+    if not solved.success or abs(missing).max() > 1.0:
         raise EquilibriumError(
             "the search for the posture found no balance",
-            missing,
+            missing * problem.exact,
             1.0,
             arm.joint_names[int(abs(missing).argmax())],
             "Give start=, angles near the posture; or check tensions, wires and points.",
         )
-    gain = np.linalg.pinv(problem.jacobian(solved.x))[:nv]
-    cells = nv + len(arm.cables)
+    return _estimate(problem, solved.x)
+
+
+def _begin(
+    arm: Manipulator, motor_tensions: ArrayLike, wrench: LoadsLike, start: ArrayLike | None
+) -> Posture:
+    """Return the posture to start from: the given one, or where the arm rests without friction."""
+    begin: ArrayLike
+    if start is None:
+        F = vector("motor_tensions", motor_tensions, len(arm.cables), "one reading [N] per cable")
+        begin = forward_statics(
+            arm, tension=np.maximum(F, 0.0), wrench=wrench, friction=False
+        ).pose.q
+    else:
+        begin = vector("start", start, arm.nv, "one angle per joint")
+    return arm.at(begin, check_limits=False)
+
+
+def _wires(
+    arm: Manipulator, rest_lengths: ArrayLike | None, std: ArrayLike | None
+) -> tuple[Array, Array] | None:
+    """Return the wires (C,) [m] that the motors have left, and their standard uncertainties."""
+    if rest_lengths is None:
+        if std is not None:
+            raise InvalidInput("rest_length_std", "is of rest_lengths, which are not given.")
+        return None
+    names = arm.cables.names
+    wire = vector("rest_lengths", rest_lengths, len(names), "one length [m] per cable", "length")
+    of_wire = _WIRE_STD if std is None else std
+    return wire, spread("rest_length_std", of_wire, names, "length", "a wire is not exact")
+
+
+def _tracked(
+    arm: Manipulator, points: Mapping[str, ArrayLike] | None, std: float | None
+) -> list[_Point]:
+    """Return the points that were tracked."""
+    seen: Any = {} if points is None else points
+    if not isinstance(seen, Mapping):
+        wanted = "give a dict of positions (3,) [m] by the names of links."
+        raise InvalidInput("points", f"{points!r} given; {wanted}")
+    if not seen and std is not None:
+        raise InvalidInput("point_std", "is of points, which are not given.")
+    return [
+        _Point(
+            link_point(arm, link), vector(f"points[{link!r}]", x, 3, "a point (3,) [m]", "length")
+        )
+        for link, x in seen.items()
+    ]
+
+
+def _estimate(problem: _Problem, x: Array) -> PostureEstimate:
+    """Return what a solution says, with its uncertainty to first order."""
+    there, T = problem.at(x)
+    nv = problem.arm.nv
+    left = problem.residuals(x)
+    gain = np.linalg.pinv(problem.jacobian(x))[:nv]
+    cells = nv + len(problem.arm.cables)
     free = problem.open.shape[1]
     by_open = gain[:, cells : cells + free] @ np.linalg.pinv(problem.open)
     others = np.delete(gain, np.r_[cells : cells + free], axis=1)
@@ -332,7 +356,7 @@ def estimate_posture(
         tip_band=frozen(abs(J @ by_open) @ problem.bound),
         segment_tension=frozen(np.maximum(T, 0.0)),
         chi_square=float(left[nv:] @ left[nv:]),
-        freedom=left.size - solved.x.size,
+        freedom=left.size - x.size,
     )
 
 
