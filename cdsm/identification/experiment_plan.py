@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import InvalidInput
 from cdsm.identification.least_squares import LeastSquares
-from cdsm.identification.measurement import WeightLoop
+from cdsm.identification.weight_loop import WeightLoop
 from cdsm.manipulator import Manipulator
 from cdsm.support.determination import Determination, interval_in_percent
 from cdsm.support.format import aligned, coordinates

@@ -11,9 +11,10 @@ import numpy as np
 from cdsm.arm_parameters import ArmParameters
 from cdsm.errors import InvalidInput
 from cdsm.identification.least_squares import LeastSquares, TensionOf, Test
-from cdsm.identification.measurement import Measurement, WeightLoop, measurement_name
+from cdsm.identification.measurement import Measurement, measurement_name
 from cdsm.identification.result import Identification, independent_readings
 from cdsm.identification.tip_position import TipPosition
+from cdsm.identification.weight_loop import WeightLoop
 from cdsm.manipulator import Manipulator
 from cdsm.support.determination import likely
 from cdsm.support.format import plural

@@ -15,12 +15,12 @@ from scipy.optimize import least_squares
 from cdsm.errors import CdsmError, CdsmWarning, InvalidInput
 from cdsm.identification.measurement import (
     Measurement,
-    WeightLoop,
     measurement_name,
     tension_before,
 )
 from cdsm.identification.tip_position import TipPosition
 from cdsm.identification.warm_starts import LoopPaths, WarmStarts
+from cdsm.identification.weight_loop import WeightLoop
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.quasi_static import EquilibriumPath

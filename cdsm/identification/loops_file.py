@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import FileError, InvalidInput
 from cdsm.identification.cells import LENGTH, axis_in, link_in
-from cdsm.identification.measurement import WeightLoop
+from cdsm.identification.weight_loop import WeightLoop
 from cdsm.joint_columns import JointColumns
 from cdsm.manipulator import Manipulator
 from cdsm.support.tables import FORCE, TEXT, Columns, Row

@@ -15,8 +15,9 @@ from scipy.special import ndtri
 from cdsm.errors import InvalidInput
 from cdsm.identification.intervals import interval
 from cdsm.identification.least_squares import LeastSquares, Test
-from cdsm.identification.measurement import WeightLoop, measurement_name
+from cdsm.identification.measurement import measurement_name
 from cdsm.identification.tip_position import TipPosition
+from cdsm.identification.weight_loop import WeightLoop
 from cdsm.manipulator import Manipulator
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.determination import Determination, chi_square_text, likely

@@ -13,15 +13,8 @@ from cdsm.applied import as_loads, between, combined, without_cables
 from cdsm.loads import loads_of
 from cdsm.support.values import Array
 from cdsm.terms import ConstantPull, Stretch
+from tests.support.arms import README_SIZES
 
-SIZES = {
-    "link_length": 0.06,
-    "base_length": 0.03,
-    "disk_offset": 0.012,
-    "hole_radius": 0.025,
-    "link_mass": 0.12,
-    "lead": 0.3,
-}
 Q = np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0.0])
 THREE = [
     cdsm.Load("link2", force=(0.0, 0.0, -3.0), point=(0.0, 0.0, -0.025)),
@@ -31,18 +24,18 @@ THREE = [
 
 
 def universal() -> cdsm.Manipulator:
-    geometry = cdsm.Geometry.universal(joints=4, cables_per_joint=3, **SIZES)
+    geometry = cdsm.Geometry.universal(joints=4, cables_per_joint=3, **README_SIZES)
     return cdsm.Manipulator(geometry, elasticity=cdsm.presets.STRAND_1X19)
 
 
 def hinged() -> cdsm.Manipulator:
-    geometry = cdsm.Geometry.hinged(joints=4, twist=1.5707963, **SIZES)
+    geometry = cdsm.Geometry.hinged(joints=4, twist=1.5707963, **README_SIZES)
     return cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e4))
 
 
 def coupled() -> cdsm.Manipulator:
     geometry = cdsm.Geometry.universal(
-        joints=4, cables_per_joint=3, coupled=True, joint_stiffness=0.8, **SIZES
+        joints=4, cables_per_joint=3, coupled=True, joint_stiffness=0.8, **README_SIZES
     )
     return cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e4))
 
