@@ -69,7 +69,7 @@ from cdsm.motors import Motor as Motor
 from cdsm.planning.path import plan_path as plan_path
 from cdsm.planning.plan import plan_stiffness as plan_stiffness
 from cdsm.planning.range import stiffness_range as stiffness_range
-from cdsm.planning.sensitivity import saturation as saturation
+from cdsm.planning.saturation import saturation as saturation
 from cdsm.planning.sensitivity import stiffness_gradient as stiffness_gradient
 from cdsm.posture import Posture as Posture
 from cdsm.springs import SpringLaw as SpringLaw

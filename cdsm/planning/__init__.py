@@ -9,5 +9,5 @@ from cdsm.planning.path_plan import InfeasibleSample as InfeasibleSample
 from cdsm.planning.path_plan import PathPlan as PathPlan
 from cdsm.planning.plan import StiffnessPlan as StiffnessPlan
 from cdsm.planning.range import StiffnessRange as StiffnessRange
-from cdsm.planning.sensitivity import Saturation as Saturation
+from cdsm.planning.saturation import Saturation as Saturation
 from cdsm.planning.sensitivity import StiffnessGradient as StiffnessGradient

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from cdsm.applied import Applied
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
 from cdsm.loads import LoadsLike
-from cdsm.planning.sensitivity import Saturation, saturation
+from cdsm.planning.saturation import Saturation, saturation
 from cdsm.plots import style
 from cdsm.plots.style import Panels
 from cdsm.posture import Posture

@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 
 from cdsm.applied import as_loads
 from cdsm.errors import CdsmError, SingularStiffness
-from cdsm.planning.sensitivity import saturation
+from cdsm.planning.saturation import saturation
 from cdsm.plots import style
 from cdsm.plots.arm import plot_arm
 from cdsm.plots.bars import plot_shares, plot_tensions
