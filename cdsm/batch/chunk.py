@@ -24,7 +24,7 @@ from cdsm.batch.rows import (
     side_by_side,
     tables_of,
 )
-from cdsm.batch.smooth_rows import Directions, Places, smooth_shifts
+from cdsm.batch.smooth_rows import Directions, PulleyPlaces, smooth_shifts
 from cdsm.batch.spring_rows import SpringRows
 from cdsm.definition import TERMS_OF_K
 from cdsm.quantities import QUANTITIES
@@ -390,7 +390,7 @@ class Chunk:
             return one_by_one(x, count)
 
         directions = Directions(*map(rows_of, (at.segment, at.motion, at.axis)))
-        places = Places(*(rows_of(getattr(contacts, name)) for name in Places._fields))
+        places = PulleyPlaces(*(rows_of(getattr(contacts, name)) for name in PulleyPlaces._fields))
         added = smooth_shifts(self._rows.arm, touching.touches, directions, places, rows_of(F))
         K[:, 0] += side_by_side(added, F.shape[2])
 

@@ -26,7 +26,7 @@ class Directions(NamedTuple):
     axis: Array  # z of all joints (N, joints, 3)
 
 
-class Places(NamedTuple):
+class PulleyPlaces(NamedTuple):
     """Pulleys and contacts in N rows, as in :class:`~cdsm.batch.path_arrays.ContactArrays`."""
 
     entry: Array  # (N, E, 3) [m]
@@ -49,7 +49,7 @@ def smooth_shifts(
     arm: Manipulator,
     touches: tuple[bool, ...],
     at: Directions,
-    places: Places,
+    places: PulleyPlaces,
     tension: Array,
 ) -> Array:
     """Compute what all shifts add to H_L·F (N, n, n), by all joints, under F (N, C)."""

@@ -11,7 +11,7 @@ from cdsm.errors import FileError, InvalidInput
 from cdsm.joint_columns import JointColumns
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.support.tables import FORCE, TEXT, Columns
+from cdsm.support.tables import NEWTONS, TEXT, Columns
 from cdsm.support.validation import instance
 from cdsm.support.values import Array, frozen
 
@@ -44,7 +44,7 @@ def read_load_cells(path: str | os.PathLike[str], arm: Manipulator) -> tuple[Loa
     """
     joints = JointColumns(instance("arm", arm, Manipulator))
     cables = arm.cables.names
-    units = {"label": TEXT} | dict.fromkeys(cables, FORCE) | joints.units
+    units = {"label": TEXT} | dict.fromkeys(cables, NEWTONS) | joints.units
     table = Columns(path, units, "readings")
     for name in cables:
         table.factor(name)

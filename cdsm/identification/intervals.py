@@ -22,7 +22,7 @@ _TRIALS = 20  # steps outward from the optimum
 _EDGE = 1e-2  # distance from the end of the model, in half widths
 
 
-def interval(
+def profile_interval(
     problem: LeastSquares, best: Array, jacobian: Array, i: int, rise: float
 ) -> tuple[float, float]:
     """Return the smallest and the largest value of parameter ``i`` with Δχ² ≤ ``rise``.

@@ -15,7 +15,7 @@ from cdsm.identification.cells import LENGTH, axis_in, link_in
 from cdsm.identification.weight_loop import WeightLoop
 from cdsm.joint_columns import JointColumns
 from cdsm.manipulator import Manipulator
-from cdsm.support.tables import FORCE, TEXT, Columns, Row
+from cdsm.support.tables import NEWTONS, TEXT, Columns, Row
 from cdsm.support.validation import instance
 from cdsm.support.values import Array
 
@@ -68,8 +68,8 @@ def read_loops(
     """
     joints = JointColumns(instance("arm", arm, Manipulator))
     cables = arm.cables.names
-    units = {"test": TEXT, "direction": TEXT, "force": FORCE, "minimum": FORCE, "link": TEXT}
-    units |= dict.fromkeys(("displacement", *"xyz"), LENGTH) | dict.fromkeys(cables, FORCE)
+    units = {"test": TEXT, "direction": TEXT, "force": NEWTONS, "minimum": NEWTONS, "link": TEXT}
+    units |= dict.fromkeys(("displacement", *"xyz"), LENGTH) | dict.fromkeys(cables, NEWTONS)
     table = Columns(path, units | joints.units, "loops")
     file = _LoopsFile(table, arm, joints, _readings(table), _tensions(table, cables))
     file.check_header(given=minimum is not None)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from cdsm.errors import InvalidInput
-from cdsm.identification.intervals import interval
+from cdsm.identification.intervals import profile_interval
 from cdsm.identification.least_squares import LeastSquares, Test
 from cdsm.identification.measurement import measurement_name
 from cdsm.identification.tip_position import TipPosition
@@ -233,7 +233,7 @@ class Identification(Result, Plotted):
         with progress_allowed(progress), counted:
             for i in range(best.size):
                 known = math.isfinite(self.std[i])
-                limits = interval(problem, best, jacobian, i, rise) if known else None
+                limits = profile_interval(problem, best, jacobian, i, rise) if known else None
                 intervals[self.names[i]] = limits or (-math.inf, math.inf)
         return intervals
 

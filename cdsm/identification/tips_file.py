@@ -11,7 +11,7 @@ from cdsm.dead_loads import Load
 from cdsm.identification.cells import LENGTH, axis_in, link_in
 from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
-from cdsm.support.tables import FORCE, TEXT, Columns, Row
+from cdsm.support.tables import NEWTONS, TEXT, Columns, Row
 from cdsm.support.validation import instance
 
 _MASS: Final = {"kg": 1.0, "g": 1e-3}
@@ -56,15 +56,15 @@ def read_tip_positions(
     """
     names = instance("arm", arm, Manipulator).cables.names
     units = {"label": TEXT} | dict.fromkeys("xyz", LENGTH) | dict.fromkeys(names, LENGTH)
-    units |= {"direction": TEXT, "force": FORCE, "mass": _MASS}
+    units |= {"direction": TEXT, "force": NEWTONS, "mass": _MASS}
     units |= {"link": TEXT, "load_link": TEXT}
     table = Columns(path, units, "positions")
     axes, cables = ([name for name in group if name in table] for group in ("xyz", names))
     if not axes or not cables:
         table.refuse(f"needs a column x, y or z [mm], and one of a cable, such as {names[0]} [mm]")
-    motors = "tension" if table.unit[cables[0]] in FORCE else "pull"
+    motors = "tension" if table.unit[cables[0]] in NEWTONS else "pull"
     if motors == "tension":
-        table.units |= dict.fromkeys(cables, FORCE)
+        table.units |= dict.fromkeys(cables, NEWTONS)
     loads = [name for name in ("force", "mass") if name in table]
     for name in (*axes, *cables, *loads):
         table.factor(name)

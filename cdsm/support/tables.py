@@ -18,7 +18,7 @@ ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 SLIDE: Final = {"mm": 1e-3, "m": 1.0}
 """Units of a prismatic joint in a header, in SI."""
 
-FORCE: Final = {"N": 1.0}
+NEWTONS: Final = {"N": 1.0}
 """Units of forces and tensions in a header, in SI."""
 
 TEXT: Final[dict[str, float]] = {}
