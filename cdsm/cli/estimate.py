@@ -26,7 +26,9 @@ def estimate(
     arm: options.ArmArgument,
     readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help=_READINGS)],
     tension_std: Annotated[float, opt("Standard uncertainty of the load cells.", "N")],
-    angle_std: Annotated[float, opt("The same of the angles. Default: exact.", "DEG")] = 0.0,
+    angle_std: Annotated[
+        float, opt("The same of the angles. Default: exact.", "DEG", min=0.0)
+    ] = 0.0,
     link: Annotated[list[str] | None, opt(_LINK, "LINK[=WHAT]")] = None,
     sliding: Annotated[Literal["in", "out"] | None, opt(_SLIDING)] = None,
     changes: options.SetOption = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +37,8 @@ def read_load_cells(path: str | os.PathLike[str], arm: Manipulator) -> tuple[Loa
     The header names the columns, with the unit in brackets; the order is free: one of each cable,
     such as ``cable1_1 [N]``; one of each joint, such as ``joint1_1 [deg]`` or ``[rad]`` (``[mm]``
     or ``[m]`` where it slides), or none where it is at 0; optional ``label``. Columns of joints
-    that follow others are checked.
+    that follow others are checked. Readings without a label, or with that of others, have their
+    line in it.
 
     Raises:
         FileError: The file cannot be read, a column is missing or has no unit, or an entry is
@@ -50,12 +52,16 @@ def read_load_cells(path: str | os.PathLike[str], arm: Manipulator) -> tuple[Loa
         table.factor(name)
     if not any(name in table for name in arm.joint_names):
         table.refuse(f"has no angle; give a column for each joint, such as {joints.first}")
+    labels = [table.text(row, "label") for row in table.rows]
+    counts = Counter(labels)
     readings = []
-    for row in table.rows:
+    for row, label in zip(table.rows, labels, strict=True):
         try:
             pose = arm.at(joints.angles(table, [row])[0], check_limits=False)
         except InvalidInput as error:
             raise FileError(path, f"line {row[0]}: {error}") from None
         F = frozen(np.array([table.number(row, name) for name in cables]))
-        readings.append(LoadCellReading(table.text(row, "label") or f"line {row[0]}", pose, F))
+        where = f"line {row[0]}"
+        name = label if counts[label] == 1 else ", ".join(filter(None, (label, where)))
+        readings.append(LoadCellReading(name or where, pose, F))
     return tuple(readings)

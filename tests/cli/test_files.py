@@ -235,3 +235,15 @@ def test_joints_without_limits_are_searched_and_never_at_a_limit(tmp_path: Path)
     assert not far.reachable
     assert "z1" not in far.at_limit
     assert far.position_error == pytest.approx(0.2, abs=1e-6)  # the straight finger is 0.1 m long
+
+
+def test_readings_with_one_label_are_all_estimated(tmp_path: Path) -> None:
+    """Equal labels get their line; the first of two readings had been lost."""
+    text = (SAMPLES / "LOAD_CELLS.csv").read_text(encoding="utf-8")
+    file = tmp_path / "cells.csv"
+    lines = text.splitlines()
+    file.write_text("\n".join([*lines, lines[-1].replace("-0.13", "-0.14")]), encoding="utf-8")
+    found = [each.label for each in read_load_cells(file, cdsm.Manipulator.read(ARM))]
+    assert len(found) == len({*found}) == len(lines) - 2
+    name = lines[-1].partition(",")[0]
+    assert found[-2:] == [f"{name}, line {len(lines)}", f"{name}, line {len(lines) + 1}"]
