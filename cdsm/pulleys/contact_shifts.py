@@ -43,6 +43,8 @@ from cdsm.support.values import Array
 IN_PLANE = 1e-12
 """Sine of γ, and kink per radian, that are rounding."""
 
+_ONE = np.eye(3)
+
 
 class Ends(NamedTuple):
     """Free pieces at the 2 T contacts, T on arrival and then T on departure; none on a rim."""
@@ -52,7 +54,8 @@ class Ends(NamedTuple):
     free: NDArray[np.bool_]  # whether there is one (2T,)
     way: Array  # −1 on arrival, where the contact is B of its piece; +1 on departure (2T,)
     before: Indices  # the touching pulley right before each (T,); −1: a site
-    entries: tuple[Indices, Indices, Indices]  # joints of the pieces: piece, place in path, joint
+    contacts: Indices  # of each piece, at B and at A (2, G); 2T: there is none
+    entries: tuple[Indices, ...]  # joints of the pieces: piece, segment, place in path, joint
 
     @classmethod
     def of(cls, routing: Routing, piece_in: Indices, piece_out: Indices, before: Indices) -> Self:
@@ -60,14 +63,19 @@ class Ends(NamedTuple):
         both = np.concatenate([piece_in, piece_out])
         free = both >= 0
         segment = np.unique(both[free])
+        piece = np.searchsorted(segment, np.where(free, both, 0)) % max(segment.size, 1)
+        contacts = np.full((2, segment.size), len(both))
+        side = np.repeat([0, 1], len(before))
+        contacts[side[free], piece[free]] = np.flatnonzero(free)
         g, m = np.nonzero(routing.sign[segment])
         return cls(
             segment=segment,
-            piece=np.searchsorted(segment, np.where(free, both, 0)) % max(segment.size, 1),
+            piece=piece,
             free=free,
             way=np.repeat([-1.0, 1.0], len(before)),
             before=before,
-            entries=(g, m, routing.path[segment][g, m]),
+            contacts=contacts,
+            entries=(g, segment[g], m, routing.path[segment][g, m]),
         )
 
     def repeated(self, postures: int) -> Ends:
@@ -81,14 +89,18 @@ class Ends(NamedTuple):
         shape = (2, postures, T)
         piece = self.piece.reshape(2, 1, T) + G * place
         before = np.where(self.before >= 0, self.before + T * place, -1)
-        g, m, joint = self.entries
+        side, t = np.divmod(self.contacts[:, None], max(T, 1))  # side 2: there is none
+        contacts = T * postures * side + np.where(side < 2, t + T * place, 0)
+        g, _, m, joint = self.entries
+        every = (g + G * place).ravel()
         return Ends(
             segment=np.arange(postures * G),
             piece=piece.ravel(),
             free=np.broadcast_to(self.free.reshape(2, 1, T), shape).ravel(),
             way=np.broadcast_to(self.way.reshape(2, 1, T), shape).ravel(),
             before=before.ravel(),
-            entries=((g + G * place).ravel(), np.tile(m, postures), np.tile(joint, postures)),
+            contacts=contacts.reshape(2, -1),
+            entries=(every, every, np.tile(m, postures), np.tile(joint, postures)),
         )
 
 
@@ -151,8 +163,13 @@ class Shifts:
     postures: int = 1
 
     @cached_property
+    def _axes(self) -> Array:
+        """Axis of the pulley of each contact (3, 2T)."""
+        return np.concatenate([self.axis, self.axis], axis=1)
+
+    @cached_property
     def _contacts(self) -> _Contacts:
-        axis = np.concatenate([self.axis, self.axis], axis=1)
+        axis = self._axes
         out = self.radial - dot(axis, self.radial) * axis
         normal = out / np.sqrt(dot(out, out))
         return _Contacts(normal, cross(normal, self._direction), self._sine)
@@ -165,8 +182,7 @@ class Shifts:
 
     @cached_property
     def _sine(self) -> Array:
-        axis = np.concatenate([self.axis, self.axis], axis=1)
-        return dot(axis, self._direction)
+        return dot(self._axes, self._direction)
 
     @property
     def fleet(self) -> Array:
@@ -176,8 +192,7 @@ class Shifts:
     @cached_property
     def _climb(self) -> Array | None:
         """κ with its sign (2T,) [m] where cables leave a groove; None: all in their planes."""
-        held = np.concatenate([self.groove, self.groove])
-        sine = np.where(held, self._sine, 0.0)
+        sine = self._sine * np.concatenate([self.groove, self.groove])
         if abs(sine).max(initial=0.0) <= IN_PLANE:
             return None
         radius = np.concatenate([self.radius, self.radius])
@@ -191,28 +206,28 @@ class Shifts:
         u = spans.direction[:, ends.segment]
         # one column for each joint
         moved, turned = np.zeros((2, 3, ends.segment.size, self.routing.joint_count))
-        g, m, joint = ends.entries
-        moved[:, g, joint] = spans.motion[:, ends.segment[g], m]
-        turned[:, g, joint] = cross(spans.axis[:, ends.segment[g], m], u[:, g])
+        g, segment, m, joint = ends.entries
+        moved[:, g, joint] = spans.motion[:, segment, m]
+        turned[:, g, joint] = cross(spans.axis[:, segment, m], u[:, g])
         if self.routing.coupling:
             moved = self.routing.reduced(moved)
             turned = self.routing.reduced(turned)
-        # N = (1 − uuᵀ)/ℓ, or with the flanks of the grooves at both ends
+        # N = (1 − uuᵀ)/ℓ; with the flanks K of grooves at both ends, of which K² = k² (1 − uuᵀ),
+        # N = (ℓ (1 − uuᵀ) − K)/(ℓ² − k²)
         scale = length[:, None, None]
-        uu = u.T[:, :, None] * u.T[:, None]
+        plane = _ONE - u.T[:, :, None] * u.T[:, None]
         if self._climb is None:
-            compliance = (np.eye(3) - uu) / scale
+            compliance = plane / scale
             turn = _apply(compliance, moved)
             return _Pieces(length, moved, turned, moved, compliance, None, turn)
         normal, across, _ = self._contacts
         nb = normal.T[:, :, None] * (self._climb * across).T[:, None]
-        flanks = np.zeros((2, ends.segment.size, 3, 3))
-        T = len(self.radius)
-        for side, flank in zip((slice(T), slice(T, None)), flanks, strict=True):
-            some = ends.free[side]
-            flank[ends.piece[side][some]] = (nb + nb.transpose(0, 2, 1))[side][some]
-        at_b, at_a = flanks
-        compliance = np.linalg.inv(scale * np.eye(3) + at_a + at_b) - uu / scale
+        flank = np.zeros((len(nb) + 1, 3, 3))
+        flank[:-1] = nb + nb.transpose(0, 2, 1)
+        at_b, at_a = flank[ends.contacts]
+        both = at_a + at_b
+        square = 0.5 * np.einsum("gxy,gxy->g", both, both)[:, None, None]
+        compliance = (scale * plane - both) / (scale * scale - square)
         effective = moved + _apply(at_b, turned)
         turn = _apply(compliance, effective)
         return _Pieces(length, moved, turned, effective, compliance, at_b, turn)
@@ -273,49 +288,71 @@ class Shifts:
         return tuple(side.reshape(postures * T, -1) for side in np.split(shifts, 2, axis=1))  # type: ignore[return-value]
 
     @cached_property
-    def _added(self) -> Array | None:
-        """What each piece adds to ∂²ℓ with held contacts (G, nv, nv) [m/rad²]; None: nothing.
+    def _factors(self) -> tuple[tuple[Array, Array], ...]:
+        """Columns (3, G, nv) whose products add to ∂²ℓ of each piece with held contacts."""
+        x = self._pieces
+        if x.flank is None:
+            return ()
+        u = self.spans.direction[:, self.ends.segment, None]
+        held = x.moved - dot(u, x.moved) * u
+        return (
+            (x.effective, x.turn),
+            (held / -x.length[:, None], held),
+            (-x.turned, _apply(x.flank, x.turned)),
+        )
+
+    @property
+    def _are_none(self) -> bool:
+        """Whether contacts add nothing."""
+        return self._climb is None and self._slips is None
+
+    def hessian(self, weight: Array) -> Array | float:
+        """Compute what shifts add to Σ weight_s ∂²ℓ_s (nv, nv), weights (S,); 0: nothing.
 
         Only the sum over the pieces of a cable is symmetric.
         """
-        if self._climb is None and self._slips is None:
-            return None
-        x = self._pieces
-        G, n = x.moved.shape[1:]
-        added = np.zeros((G, n, n))
-        if x.flank is not None:
-            u = self.spans.direction[:, self.ends.segment, None]
-            held = x.moved - dot(u, x.moved) * u
-            added += _products(x.effective, x.turn)
-            added -= _products(held, held / x.length[:, None])
-            added -= _products(x.turned, _apply(x.flank, x.turned))
-        if self._slips is not None:
-            work = self._slips.kink[:, :, None] * self._slips.shift[:, None]
-            np.add.at(added, self.ends.piece, work)
-        return added
-
-    def hessian(self, weight: Array) -> Array | float:
-        """Compute what shifts add to Σ weight_s ∂²ℓ_s (nv, nv), weights (S,); 0: nothing."""
-        if self._added is None:
+        if self._are_none:
             return 0.0
-        H = np.tensordot(weight[self.ends.segment], self._added, 1)
-        return np.asarray(0.5 * (H + H.T))
+        F = weight[self.ends.segment, None]
+        n = self._pieces.moved.shape[2]
+        H = np.zeros((n, n))
+        for left, right in self._factors:
+            H += (F * left).reshape(-1, n).T @ right.reshape(-1, n)
+        if self._slips is not None:
+            H += (F[self.ends.piece] * self._slips.kink).T @ self._slips.shift
+        return 0.5 * (H + H.T)
 
     def hessian_of_each(self, weight: Array) -> Array | float:
         """Compute the same (N, nv, nv) of N postures, with weights (N, G) of the free pieces."""
-        if self._added is None:
+        if self._are_none:
             return 0.0
-        added = self._added.reshape(*weight.shape, *self._added.shape[1:])
-        H = np.einsum("ng,ngij->nij", weight, added)
+        N = len(weight)
+        n = self._pieces.moved.shape[2]
+        H = np.zeros((N, n, n))
+        for left, right in self._factors:
+            weighted = _of_each(left * weight.reshape(-1, 1), N)
+            H += weighted.transpose(0, 2, 1) @ _of_each(right, N)
+        if self._slips is not None:
+            both = (2, -1, n)  # sides
+            kink = (self._slips.kink * weight.ravel()[self.ends.piece, None]).reshape(both)
+            shift = _of_each(self._slips.shift.reshape(both), N)
+            H += _of_each(kink, N).transpose(0, 2, 1) @ shift
         return np.asarray(0.5 * (H + H.transpose(0, 2, 1)))
 
     def hessians(self, weight: Array, group: Indices, count: int) -> Array | float:
         """Compute what shifts add to the same sums of each of ``count`` groups of segments (S,)."""
-        if self._added is None:
+        if self._are_none:
             return 0.0
-        H = np.zeros((count, *self._added.shape[1:]))
+        n = self._pieces.moved.shape[2]
+        added = np.zeros((self.ends.segment.size, n, n))
+        for left, right in self._factors:
+            added += left.transpose(1, 2, 0) @ right.transpose(1, 0, 2)
+        if self._slips is not None:
+            work = self._slips.kink[:, :, None] * self._slips.shift[:, None]
+            np.add.at(added, self.ends.piece, work)
+        H = np.zeros((count, n, n))
         segment = self.ends.segment
-        np.add.at(H, group[segment], weight[segment, None, None] * self._added)
+        np.add.at(H, group[segment], weight[segment, None, None] * added)
         return np.asarray(0.5 * (H + H.transpose(0, 2, 1)))
 
     @cached_property
@@ -361,9 +398,11 @@ def _apply(matrix: Array, columns: Array) -> Array:
     return np.asarray((matrix @ columns.transpose(1, 0, 2)).transpose(1, 0, 2))
 
 
-def _products(a: Array, b: Array) -> Array:
-    """Multiply the columns (3, G, n) of a and b: (G, n, n)."""
-    return np.asarray(a.transpose(1, 2, 0) @ b.transpose(1, 0, 2))
+def _of_each(columns: Array, postures: int) -> Array:
+    """Put the columns (k, postures · m, n) of each posture below each other: (postures, k m, n)."""
+    k, _, n = columns.shape
+    parts = columns.reshape(k, postures, -1, n)
+    return parts.transpose(1, 0, 2, 3).reshape(postures, -1, n)
 
 
 def _form(a: Array, matrix: Array, b: Array) -> Array:

@@ -91,13 +91,16 @@ class Wrapping:
         touches = self.contacts.touches
         remarks = []
         for i, angle in enumerate(self.contacts.angle):
+            snapped = angle > 0.0 and not touches[i]
+            if not snapped and abs(angle) >= _NEAR:
+                continue
             cable, label = self.wraps.label(i)
-            if angle > 0.0 and not touches[i]:
+            if snapped:
                 remarks.append(
                     f"{cable} has snapped out of the groove of {label}, beside its plane: there L "
                     "has a step, and an equilibrium may not exist"
                 )
-            elif abs(angle) < _NEAR:
+            else:
                 remarks.append(
                     f"{cable} is within {math.degrees(_NEAR):g}° of lifting off {label}: K_θ has "
                     "another value on the other side"
