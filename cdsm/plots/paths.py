@@ -161,8 +161,9 @@ def plot_modes(
     draw_arm(drawing, pose)
     for line in panel.lines:
         line.set_alpha(0.35)
-    names = [f"grows at {rate:.3g}/s" for rate in modes.growth_rates]
-    names += [f"{frequency:.3g} Hz" for frequency in modes.frequencies]
+    # numbers tell modes apart whose rates print alike
+    names = [f"growth {k}, {rate:.3g}/s" for k, rate in enumerate(modes.growth_rates, 1)]
+    names += [f"mode {k}, {frequency:.3g} Hz" for k, frequency in enumerate(modes.frequencies, 1)]
     shapes = np.hstack([modes.growth_shapes, modes.shapes]).T
     for shape, name, color in zip(shapes, names, style.COLORS[:_SHAPES], strict=False):
         moved = np.linalg.norm(pose.jacobian[:3] @ shape) / pose.arm.length
@@ -173,7 +174,8 @@ def plot_modes(
             panel.plot(*ends, color=color, lw=1.6, zorder=5, gid=f"mode:{name}:{k}")
         panel.plot([], [], color=color, label=name)
     drawing.finish(fit=ax is None)
-    panel.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=3, columnspacing=1.2)
+    narrow = {"ncols": 3, "columnspacing": 1.0, "handlelength": 1.5}
+    panel.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), **narrow)
     style.set_title(panel, title, f"{pose.arm.name}: how does it swing? Enlarged", modes.is_stable)
     return panel
 

@@ -292,26 +292,42 @@ def test_path_has_the_way_of_the_tip_and_a_film(plan: PathPlan, tmp_path: Path) 
             np.testing.assert_allclose(to_rgba(color), shade, atol=1e-9)
 
 
-def test_the_arm_of_a_film_moves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    titles: list[str] = []
+def test_each_frame_of_a_film_has_its_own_posture_tensions_and_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    poses = [POSE.arm.at(share * POSE.q) for share in (-1.0, 0.0, 1.0)]
+    F = np.random.default_rng(1).uniform(10.0, 90.0, (3, len(POSE.arm.cables)))
+    tips = np.array([1e3 * pose.tip[[0, 2], 3] for pose in poses])
     grab: Any = PillowWriter.grab_frame
+    frames: list[str] = []
 
     def read(writer: Any, **options: Any) -> None:
-        titles.append(writer.fig.axes[0].get_title(loc="left"))
+        ax, k = writer.fig.axes[0], len(frames)
+        frames.append(ax.get_title(loc="left"))
+        for i, bone in enumerate(poses[k].bones):
+            np.testing.assert_allclose(line(ax, f"bone:{i}"), 1e3 * bone[:, [0, 2]], atol=1e-9)
+        for name, path, pull in zip(POSE.arm.cables.names, poses[k].cable_paths, F[k], strict=True):
+            cable = artists(ax, f"cable:{name}:0")[f"cable:{name}:0"]
+            np.testing.assert_allclose(cable.get_xydata(), 1e3 * path[:2, [0, 2]])
+            shade = TENSION_COLORS((pull - F.min()) / np.ptp(F))
+            np.testing.assert_allclose(to_rgba(cable.get_color()), shade, atol=1e-9)
+        np.testing.assert_allclose(line(ax, "way"), tips[: k + 1], atol=1e-9)
+        (bar,) = (child for child in ax.child_axes if child.get_title(loc="left") == "N")
+        np.testing.assert_allclose(bar.get_ylim(), [F.min(), F.max()])
         grab(writer, **options)
 
     monkeypatch.setattr(PillowWriter, "grab_frame", read)
-    poses = [POSE.arm.at(share * POSE.q) for share in (-1.0, 0.0, 1.0)]
-    plots.plot_path(poses, view=FRONT, animate=tmp_path / "arm.gif")
+    plots.plot_path(poses, view=FRONT, tensions=F, animate=tmp_path / "arm.gif")
+    assert frames == [f"{POSE.arm.name}, posture {k} of 2" for k in range(3)]
     with Image.open(tmp_path / "arm.gif") as film:
-        frames = []
+        assert film.n_frames == 3  # type: ignore[attr-defined]
+        pictures = []
         for k in range(3):
             film.seek(k)
-            frames.append(np.asarray(film.convert("L"), dtype=float)[60:])  # below the title
-    grey = [abs(frame - 204.0) < 3.0 for frame in frames]  # the links
+            pictures.append(np.asarray(film.convert("L"), dtype=float)[60:])  # below the title
+    grey = [abs(picture - 204.0) < 3.0 for picture in pictures]  # the links
     moved = [np.mean(one != other) / np.mean(one) for one, other in pairwise(grey)]
     assert min(moved) > 0.5
-    assert titles == [f"{POSE.arm.name}, posture {k} of 2" for k in range(3)]
 
 
 def test_modes_are_drawn_in_their_shapes() -> None:
@@ -321,8 +337,10 @@ def test_modes_are_drawn_in_their_shapes() -> None:
     keys = zip(legend.get_lines(), legend.get_texts(), strict=True)
     colors = {text.get_text(): key.get_color() for key, text in keys}
     assert len(colors) == 3
-    for frequency, shape in zip(modes.frequencies, modes.shapes.T[:3], strict=False):
-        name = f"{frequency:.3g} Hz"
+    for k, (frequency, shape) in enumerate(
+        zip(modes.frequencies[:3], modes.shapes.T, strict=False)
+    ):
+        name = f"mode {k + 1}, {frequency:.3g} Hz"
         gid = f"mode:{name}:{len(POSE.bones) - 1}"
         tip = line(ax, gid)[-1] / 1e3 - POSE.tip[[0, 2], 3]
         wanted = (POSE.jacobian[:3] @ shape)[[0, 2]]
@@ -336,22 +354,21 @@ def test_deflections_that_grow_are_named_by_their_rate() -> None:
     modes = cdsm.modes(cdsm.stiffness(loose, cdsm.distribute_tension(loose, 100.0)))
     ax = modes.plot(view=FRONT)
     said = [text.get_text() for text in ax.get_legend().get_texts()]
-    rates = [f"grows at {rate:.3g}/s" for rate in modes.growth_rates]
-    assert said == [*rates, *(f"{frequency:.3g} Hz" for frequency in modes.frequencies)][:3]
+    rates = [f"growth {k}, {rate:.3g}/s" for k, rate in enumerate(modes.growth_rates, 1)]
+    swings = [f"mode {k}, {frequency:.3g} Hz" for k, frequency in enumerate(modes.frequencies, 1)]
+    assert said == [*rates, *swings][:3]
     assert rates
+    assert len({name.partition(", ")[2] for name in rates}) < len(rates)  # some print alike
     assert ax.get_title(loc="left").startswith("UNSTABLE")
     bent = {gid.rpartition(":")[0] for gid in artists(ax, "mode:")}
     assert bent == {f"mode:{name}" for name in said}
-    told = []
     for name, shape in zip(rates[:3], modes.growth_shapes.T, strict=False):
         near = loose.arm.at(loose.q + 1e-4 * shape, check_limits=False).bones
         up = np.array([new[1, 2] - old[1, 2] for new, old in zip(near, loose.bones, strict=True)])
         drawn = [line(ax, f"mode:{name}:{k}")[1, 1] for k in range(len(loose.bones))]
-        if said.count(name) == 1:  # others are drawn under the same name
-            flat = [1e3 * bone[1, 2] for bone in loose.bones]
-            assert np.corrcoef(up, np.subtract(drawn, flat))[0, 1] > 0.9
-            told.append(name)
-    assert told
+        flat = [1e3 * bone[1, 2] for bone in loose.bones]
+        assert np.corrcoef(up, np.subtract(drawn, flat))[0, 1] > 0.9
+    require_look(ax)
 
 
 def test_forces_within_the_outline_are_those_that_cables_balance() -> None:
