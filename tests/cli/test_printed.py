@@ -197,13 +197,18 @@ def test_weigh(words: str) -> None:
 
 def test_weigh_in_cycles_and_their_table(tmp_path: Path) -> None:
     out = tmp_path / "loop.csv"
-    words = f"--mass 0.2 --set friction=0.1 --cycles 1 --steps 4 --out {out}"
+    words = f"--mass 0.2 --set friction=0.1 --cycles 2 --steps 1 --out {out}"
     text, answer = both(f"weigh ARM --angles 8 {words}")
     lines = text.partition("lost [mJ]\n")[2].splitlines()
     head, *readings = csv.reader(out.read_text(encoding="utf-8").splitlines())
     assert head[1:4] == [f"force {axis} [N]" for axis in "xyz"]
     assert head[4:7] == [f"displacement {axis} [m]" for axis in "xyz"]
-    for k, reading in enumerate(readings):
+    assert head[-1] == "events"
+    for k, (*reading, told) in enumerate(readings):
+        events = [event for event in answer["events"] if event["step"] == k]
+        for said, event in zip(filter(None, told.split("; ")), events, strict=True):
+            assert said.startswith(event["place"])
+            require_all([(numbers(said, "at {}")[0], event["load_N"])])
         cells = lines[k].split()
         sliding = np.count_nonzero(answer["sliding"][k])
         lost = answer["dissipated_J"][k]
@@ -215,6 +220,10 @@ def test_weigh_in_cycles_and_their_table(tmp_path: Path) -> None:
         require_all(zip(printed, numbers_of_row, strict=True), digits=None)
         np.testing.assert_allclose([float(x) for x in reading], numbers_of_row)
     require_all([(numbers(text, "in all {} lost")[0], sum(answer["dissipated_J"]))])
+    first, second = np.split(np.array(answer["dissipated_J"]), 2)
+    assert answer["lost_in_last_cycle_J"] == pytest.approx(second.sum())
+    assert first.sum() != pytest.approx(second.sum(), rel=1e-3)
+    assert answer["left_over_m"] == pytest.approx(np.linalg.norm(answer["displacement_m"][-1]))
     last = numbers(text, "the last cycle loses {}; residual displacement {}")
     require_all(zip(last, (answer["lost_in_last_cycle_J"], answer["left_over_m"]), strict=True))
 
@@ -388,6 +397,71 @@ def test_identify_and_plan_of_tests() -> None:
         require_all([(Printed(rows[name]["expected"].text, ""), value)])
         share = numbers(rows[name]["95 %"].text, "± {}")
         require_all([(share[0], 1.96 * std / value)], digits=3)
+
+
+@pytest.mark.parametrize(
+    "sought",
+    [
+        "--link tool0",
+        "--link tool0=fx,fy,fz,mz --link link2=fz --set friction=0.1",
+        "--link tool0=wrench --link link2=fy,fz",  # of which the readings do not tell all
+    ],
+)
+def test_estimate(sought: str) -> None:
+    std = "--tension-std 0.5 --angle-std 0.1"
+    text, answer = both(f"estimate ARM DATA/LOAD_CELLS.csv {std} {sought}")
+    parts = text.split("\n\n")
+    assert [part.splitlines()[0] for part in parts] == [*answer["readings"]]
+    for part, found in zip(parts, answer["readings"].values(), strict=True):
+        require_estimate(part, found)
+
+
+def require_estimate(text: str, found: Answer) -> None:
+    """The loads with what they leave unknown, and the combinations of them that are told."""
+    for warning in found["warnings"]:
+        assert warning in text
+    (cells,) = {*found["tension_std_N"].values()}
+    (angles,) = {*found["angle_std_rad"].values()}
+    read = numbers(text, "from {} load cells (±{} N) and {} angles (±{})")
+    counts = len(found["motor_tension_N"]), len(found["angles_rad"])
+    require_all(zip(read, (counts[0], cells, counts[1], angles), strict=True))
+    units = {name: "N m" if name[0] == "m" else "N" for name in found["loads_N_or_Nm"]}
+    # empty cells at the end of a row are not printed
+    text = re.sub("not told$", f"not told{' ' * 40}", text, flags=re.MULTILINE)
+    rows = table(text, "load  ")
+    assert [*rows] == [f"{name} [{unit}]" for name, unit in units.items()]
+    for (name, unit), cells in zip(units.items(), rows.values(), strict=True):
+        value, _, half = cells["value ± std"].text.partition(" ± ")
+        std = found["std_N_or_Nm"][name]
+        if std is None:
+            assert value == "not told"
+            continue
+        load = (Printed(value, unit), found["loads_N_or_Nm"][name]), (Printed(half, unit), std)
+        require_all(load, digits=None)
+        for column, key in (("friction ±", "band"), ("combined std", "uncertainty")):
+            printed = Printed(cells[column].text, unit)
+            require_all([(printed, found[f"{key}_N_or_Nm"][name])], digits=2)
+    sums = table(text, "combination")
+    seen = zip(sums.items(), found["seen"], found["seen_std_N"], found["seen_band_N"], strict=True)
+    for (words, cells), row, std, band in seen:
+        terms = re.findall(r"([-+]\d\.\d\d) (\w\w)(?: at (\w+))?", words)
+        for part, component, link in terms:
+            name = f"{component} at {link or 'tool0'}"
+            require_all([(Printed(part, ""), row[[*units].index(name)])], digits=None)
+        small = np.delete(row, [[*units].index(f"{c} at {k or 'tool0'}") for _, c, k in terms])
+        assert (abs(small) <= 0.05 * max(map(abs, row))).all()
+        if std is None:
+            assert cells["std"].text == "not told"
+            continue
+        require_all([(cells["std"], std), (cells["friction ±"], band)], digits=2)
+    for line in re.findall(r".* are correlated at .*", text):
+        one, other = re.match(r"(.*) and (.*) are", line).groups()  # type: ignore[union-attr]
+        (said,) = numbers(line, "correlated at {}")
+        wanted = found["correlation"][[*units].index(one)][[*units].index(other)]
+        require_all([(said, wanted)], digits=None)
+    chi = numbers(text, "χ² = {} with {} degrees of freedom (right models and σ: smaller in {} of")
+    less = chdtr(found["freedom"], found["chi_square"])
+    require_all(zip(chi, (found["chi_square"], found["freedom"], less), strict=True), digits=3)
 
 
 def test_design_and_its_table(tmp_path: Path) -> None:
