@@ -9,6 +9,7 @@ import pytest
 import cdsm
 from cdsm import paper, presets
 from tests.conftest import Results
+from tests.support.printed import Printed, require_all
 
 NUMBERS: tuple[tuple[str, str, int, str, tuple[float, ...], float], ...] = (
     ("fig5", "", 0, "computed", (-0.9946,), 1e-4),  # Eq. 19 as printed is negative
@@ -105,6 +106,31 @@ def test_report_is_strict_json_and_a_table(results: Results) -> None:
     table = paper.to_markdown(figures).splitlines()
     rows = table[2 : 2 + sum(len(figure.claims) for figure in figures)]
     assert all(line.startswith(("| Fig.", "| Table", "| Section")) for line in rows)
+    claims = [claim for figure in figures for claim in figure.claims]
+    head = table[0].strip("| ").split(" | ")
+    for line, claim in zip(rows, claims, strict=True):
+        cells = dict(zip(head, line.strip("| ").split(" | "), strict=True))
+        for column, values, digits in (
+            ("paper", claim.paper, 4),
+            ("computed", claim.computed, 3),
+            ("original length", claim.original, 3),
+            ("hung weight", claim.along, 3),
+        ):
+            require_row(cells[column].removeprefix("≤ "), values, digits)
+        known = claim.paper is not None and not claim.at_most
+        less = np.subtract(claim.computed, claim.paper) if known else None  # type: ignore[arg-type]
+        require_row(cells["difference"], less, 2)
+        assert cells["verdict"] == claim.verdict
+        assert cells["quantity"] == f"{claim.quantity} [{claim.unit}]"
+
+
+def require_row(cell: str, values: Any, digits: int) -> None:
+    """Numbers of a cell, or its dash."""
+    if values is None or not len(values):
+        assert cell == "–"
+        return
+    printed = [Printed(text, "") for text in cell.split(", ")]
+    require_all(zip(printed, values, strict=True), digits)
 
 
 @pytest.mark.parametrize(

@@ -314,6 +314,17 @@ def test_bars_of_tensions_are_tensions_between_their_bounds() -> None:
         PULL.plot(breaking=-5.0)
 
 
+def test_bounds_of_tensions_are_those_of_each_cable_that_held() -> None:
+    """A cable may ask for more, or allow less, than all of them have to."""
+    first, second, *others = POSE.arm.cables
+    most = 1.05 * PULL.values.max()
+    own = [replace(first, minimum=30.0), replace(second, maximum=most), *others]
+    ax = cdsm.distribute_tension(POSE.arm.with_cables(own).at(POSE.q), 10.0).plot()
+    least = [30.0] + [10.0] * (len(own) - 1)
+    np.testing.assert_allclose(line(ax, "bound:minimum"), np.c_[least, ax.get_yticks()])
+    np.testing.assert_allclose(line(ax, "bound:maximum"), [[most, ax.get_yticks()[1]]])
+
+
 def test_plans_stand_between_the_softest_and_the_stiffest_arm() -> None:
     reach = cdsm.stiffness_range(POSE, "z", 10.0, 200.0)
     plan = cdsm.plan_stiffness(POSE, "z", 0.8 * reach.low + 0.2 * reach.high, 10.0, 200.0)
@@ -367,6 +378,15 @@ def test_names_of_cables_stand_in_the_order_of_their_last_tensions() -> None:
     cable_lines(ax, np.arange(3.0), values, ["falls", "rises", "ends"][::-1])
     heights = {name: named(ax)[name].xy[1] for name in ("ends", "rises", "falls")}
     np.testing.assert_allclose([*heights.values()], [8.0, 2.0, 6.0], atol=0.5)
+
+
+def test_names_without_room_are_counted() -> None:
+    ax = Figure(figsize=(3.0, 2.0)).subplots()
+    names = [f"cable{k}" for k in range(40)]
+    cable_lines(ax, np.arange(2.0), np.tile(np.arange(1.0, 41.0), (2, 1)), names)
+    shown = [name for name in names if name in named(ax)]
+    assert shown == [names[0], names[-1]]
+    assert f"{len(names) - len(shown)} more between" in named(ax)
 
 
 def test_names_move_apart_in_their_order_and_ticks_are_round() -> None:

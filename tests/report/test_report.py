@@ -1,6 +1,7 @@
 """The report: it passes where K_θ is right, fails where it is not, and says where it cannot."""
 
 import json
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +16,8 @@ from cdsm.definition import TERMS_OF_K
 from cdsm.stiffness_matrix import Report
 from cdsm.support.values import Array, frozen
 from tests.support import arms, foreign, locked
+from tests.support.printed import Printed, require_all, table
+from tests.support.sweeps import short_arm
 
 STRAND = cdsm.presets.STRAND_1X19
 TERMS = (*TERMS_OF_K, "joint")
@@ -257,6 +260,62 @@ def test_json_and_page_hold_the_report() -> None:
     assert "about &lt;it&gt;" in page
     assert "&lt;b&gt;0" in page
     assert "http:" not in page
+
+
+def test_tables_have_each_number_under_its_title() -> None:
+    """In text, where cells of a column stand below each other; the page has the same cells."""
+    report: Any = hybrid(3).report()
+    text = str(report)
+    rows = table(text, "against finite differences")
+    names = ["cdsm.evaluate, all terms" if each.name == "batch" else each.name
+             for each in report.comparisons]  # fmt: skip
+    assert [*rows] == names
+    for cells, each in zip(rows.values(), report.comparisons, strict=True):
+        require_all([(cells["largest entry"], each.largest)])
+        assert cells["largest entry"].unit == each.unit
+        shares = ("off by", each.off), ("error bound", each.error)
+        for title, value in shares:
+            require_all([(cells[title], value / (each.largest or 1.0))], digits=1)
+        assert cells["verdict"].text == each.verdict
+    assert any(cells["off by"] != cells["error bound"] for cells in rows.values())
+    said = dict(re.findall(r"(?m)^(\S+(?: \S+)*)  +(\S.*)$", text))
+    for what, value, digits in (
+        ("residual of Eq. 13", report.largest_residual, 2),
+        ("residual per torque", report.imbalance, 2),
+        ("violation of bounds", report.bound_violation, 2),
+        ("KKT residual (recomputed multipliers)", report.kkt_residual, 2),
+        ("condition of K_θ", report.condition, 3),
+    ):
+        if value is None:
+            assert said[what] == "-"
+            continue
+        require_all([(Printed(said[what].split()[0], ""), value)], digits=digits)
+    assert said["residual of Eq. 13"].endswith(f"N m at {report.residual_joint}")
+
+
+def test_what_is_near_its_end_is_noted_by_name() -> None:
+    """Cables near both ends of their laws, slack or held by a force; joints near both limits."""
+    arm = short_arm(STRAND)
+    slack, held, *others = arm.cables
+    slack = replace(slack, elasticity=cdsm.LinearElasticity(48e3))
+    arm = arm.with_cables([slack, replace(held, control="force"), *others])
+    q = np.linspace(0.1, 0.2, 6)
+    q[1] = 0.995 * arm.lower[1]
+    q[4] = 0.995 * arm.upper[4]
+    F = np.full(9, 50.0)
+    F[[0, 2, 5]] = 0.0, 1.02 * STRAND.low, 0.98 * STRAND.high
+    notes = cdsm.stiffness(arm.at(q), F).report().notes
+    cables, joints = arm.cables.names, arm.joint_names
+    for words, names in (
+        ("slack, 0 N; they stiffen one direction, raise minimum", cables[:1]),
+        ("force-controlled, no passive stiffness", cables[1:2]),
+        ("within 5 % of the low end of their law", cables[2:3]),
+        ("within 5 % of the high end of their law", cables[5:6]),
+        ("within 1 % of their range from a joint limit", (joints[1], joints[4])),
+    ):
+        assert f"{words}: {', '.join(names)}." in notes
+    inside = cdsm.stiffness(arm.at(0.5 * q), np.full(9, 50.0)).report().notes
+    assert not any(words in note for note in inside for words in ("within", "slack"))
 
 
 def test_in_a_notebook_it_is_printed_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 import cdsm
 from cdsm import Status, plots
 from cdsm.cli import app
-from tests.support.pictures import artists, require_look
+from tests.support.pictures import artists, require_look, words
+from tests.support.printed import numbers, require_all
 from tests.support.sweeps import short_arm
 
 ARM = short_arm(lead=0.3)
@@ -36,6 +37,17 @@ def test_tips_are_where_they_are_asked_for_within_the_limits(dataset: xr.Dataset
     assert (q <= ARM.upper).all()
     assert np.isnan(dataset.along.values[~reached]).all()
     assert np.isnan(tips[~reached]).all()
+
+
+def test_the_part_that_holds_is_of_the_tips_that_are_reached(dataset: xr.Dataset) -> None:
+    held = dataset.copy(deep=True)
+    at = np.argwhere(dataset.status.values == Status.OK)[:3]
+    held.status.values[tuple(at.T)] = Status.INFEASIBLE
+    held.along.values[tuple(at.T)] = np.nan
+    reached = np.count_nonzero(dataset.status != Status.OUT_OF_REACH)
+    (part,) = numbers(words(plots.plot_map(held, "along")), "{} hold")
+    holds = np.isin(held.status, [Status.OK, Status.IMMOBILE]).sum()
+    require_all([(part, holds / reached)], digits=3)
 
 
 def test_what_inverse_kinematics_reaches_is_reached(dataset: xr.Dataset) -> None:
