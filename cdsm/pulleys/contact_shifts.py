@@ -109,7 +109,6 @@ class _Contacts(NamedTuple):
 
     normal: Array  # n (3, 2T)
     across: Array  # b (3, 2T)
-    sine: Array  # sin γ (2T,)
 
 
 class _Pieces(NamedTuple):
@@ -172,7 +171,7 @@ class Shifts:
         axis = self._axes
         out = self.radial - dot(axis, self.radial) * axis
         normal = out / np.sqrt(dot(out, out))
-        return _Contacts(normal, cross(normal, self._direction), self._sine)
+        return _Contacts(normal, cross(normal, self._direction))
 
     @cached_property
     def _direction(self) -> Array:
@@ -220,7 +219,7 @@ class Shifts:
             compliance = plane / scale
             turn = _apply(compliance, moved)
             return _Pieces(length, moved, turned, moved, compliance, None, turn)
-        normal, across, _ = self._contacts
+        normal, across = self._contacts
         nb = normal.T[:, :, None] * (self._climb * across).T[:, None]
         flank = np.zeros((len(nb) + 1, 3, 3))
         flank[:-1] = nb + nb.transpose(0, 2, 1)
@@ -381,7 +380,8 @@ class Shifts:
         """
         ends = self.ends
         T = len(self.radius)
-        normal, _, sine = self._contacts
+        normal = self._contacts.normal
+        sine = self._sine
         rate = self.turning[:, ends.piece]
         rate[:, :T] -= self._pieces.turned[:, ends.piece[:T]]
         about = dot(normal[:, :, None], rate)

@@ -20,7 +20,6 @@ class Ellipsoid(NamedTuple):
 
     surface: Array  # points of the drawn surface (3, 13, 25) [m]
     scale: float  # drawn displacement over true displacement [-], a power of ten
-    longest: float  # largest true displacement per force [m/N]
 
     def __str__(self) -> str:
         large = max(self.scale, 1.0)
@@ -41,4 +40,4 @@ def ellipsoid(compliance: Array, tip: Array, length: float) -> Ellipsoid | None:
     force = np.stack([np.sin(down) * np.cos(turn), np.sin(down) * np.sin(turn), np.cos(down)])
     scale = 10.0 ** math.floor(math.log10(_LARGEST * length / longest))
     moved = scale * np.einsum("ij,j...->i...", compliance, force)
-    return Ellipsoid(frozen(moved + tip[:, None, None]), scale, longest)
+    return Ellipsoid(frozen(moved + tip[:, None, None]), scale)
