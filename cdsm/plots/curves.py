@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 
 from cdsm.errors import InvalidInput
 from cdsm.plots import style
+from cdsm.plots.lines import move_apart
 from cdsm.plots.style import MM, N_PER_MM
 from cdsm.statics.events import first_slips
 from cdsm.statics.hung_loads import total_force
@@ -205,7 +206,7 @@ def _draw_events(panel: Axes, events: Sequence[_Mark], lowest: bool = False) -> 
     wanted = np.array([event.y for event in named]) - 0.1 * (high - low)
     wanted = np.full(len(named), low) if lowest else wanted
     ends = low + 0.1 * (high - low), high - 0.1 * (high - low)
-    places = style.move_apart(np.clip(wanted, *ends), least, *ends)
+    places = move_apart(np.clip(wanted, *ends), least, *ends)
     rest = len(events) - len(named)
     for event, place in zip(named, places, strict=True):
         text = event.text + (f" (and {rest} more)" if rest and event is named[-1] else "")

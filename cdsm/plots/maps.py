@@ -17,6 +17,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocato
 from numpy.typing import NDArray
 
 from cdsm.plots import style
+from cdsm.plots.lines import line_looks, name_lines
 from cdsm.plots.map_cells import (
     FAULTS,
     HUGE,
@@ -322,7 +323,7 @@ def _plot_lines(
     ax = panels[0]
     place = coordinate.values / size
     ends = []
-    for look, case, values in zip(style.line_looks([""] * len(names)), names, x, strict=True):
+    for look, case, values in zip(line_looks([""] * len(names)), names, x, strict=True):
         words = ", ".join(case.values())
         ax.plot(place, values, gid=f"line:{words}", **look)
         known = np.flatnonzero(np.isfinite(values))[-1:]
@@ -335,7 +336,7 @@ def _plot_lines(
             ax.axvspan(low, high, fc="0.9", lw=0.0, zorder=0.4, gid="no value")
     ax.set_ylim(ax.get_ylim())
     ax.set_xlim(place.min(), place.max())
-    style.name_lines(ax, float(place.max()), ends)
+    name_lines(ax, float(place.max()), ends)
     along = "way along the path" if coordinate.name == "distance" else str(coordinate.name)
     ax.set(xlabel=f"{along} [{unit}]", ylabel=textwrap.fill(label, 30))
     about = str(dataset.attrs["title"]).removeprefix("stiffness sweep of ")

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from cdsm.plots import style
+from cdsm.plots.lines import line_looks
 from cdsm.plots.style import MM, N_PER_MM, Panels
 from cdsm.support.determination import interval_in_percent
 from cdsm.support.format import plural
@@ -80,7 +81,7 @@ def plot_identification(
 
 def _plot_loops(axes: Any, fit: Identification, loops: Sequence[tuple[int, Any]]) -> None:
     """Plot displacements of loops along the force, less the first measured one."""
-    looks = style.line_looks([loop.label or f"[{i}]" for i, loop in loops])
+    looks = line_looks([loop.label or f"[{i}]" for i, loop in loops])
     for look, (i, loop) in zip(looks, loops, strict=True):
         rows = np.flatnonzero(fit.measurement_of == i)
         along = loop.axes @ (np.array(loop.direction) / np.linalg.norm(loop.direction))

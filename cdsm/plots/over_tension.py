@@ -16,6 +16,7 @@ from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
 from cdsm.loads import LoadsLike
 from cdsm.planning.saturation import Saturation, saturation
 from cdsm.plots import style
+from cdsm.plots.lines import name_lines
 from cdsm.plots.style import Panels
 from cdsm.posture import Posture
 from cdsm.quantities import QUANTITIES, display_of, si_of
@@ -133,7 +134,7 @@ def plot_stiffness_over_tension(
     room = style.AROUND * (high - low)
     panel.set_ylim(low - room * (low < 0.0), high + room)
     panel.set_xlim(x[0], x[-1] if x[-1] > x[0] else x[0] + 1.0)
-    style.name_lines(panel, float(x[last] if len(x) > 1 else panel.get_xlim()[1]), ends)
+    name_lines(panel, float(x[last] if len(x) > 1 else panel.get_xlim()[1]), ends)
     panel.set(xlabel="least tension of all cables [N]", ylabel=f"stiffness along {name} [{unit}]")
     if np.isnan(along[last + 1 :]).any():
         bounded = bool(np.isfinite(maximum).any())

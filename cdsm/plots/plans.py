@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from cdsm.errors import InvalidInput
 from cdsm.planning.range import StiffnessRange
 from cdsm.plots import style
+from cdsm.plots.lines import cable_lines
 from cdsm.plots.style import MM, Panels
 from cdsm.support.format import stiffness_unit
 from cdsm.support.validation import instance
@@ -131,7 +132,7 @@ def plot_path_plan(
         above.plot(x, achieved[:, k], ".-", label=label, gid=f"reached:{name}", **line)
     line = {"marker": ".", "linewidth": 0.9, "markersize": 2.0}
     style.from_zero(above, wanted, achieved)
-    style.cable_lines(below, x, tensions, plan.arm.cables.names, **line)
+    cable_lines(below, x, tensions, plan.arm.cables.names, **line)
     for ax in panels:
         for i in (sample.index for sample in plan.infeasible):
             ax.axvspan(i - 0.5, i + 0.5, gid="infeasible", **style.HATCHED)
@@ -182,7 +183,7 @@ def plot_tracking_run(
     band.set(ylabel="displacement from\nfrictionless\nequilibrium [mm]")
     for ax in (stiffness, band):
         ax.legend(loc="best", ncols=2)
-    style.cable_lines(tension, t, run.tension, run.plan.arm.cables.names)
+    cable_lines(tension, t, run.tension, run.plan.arm.cables.names)
     tension.set(xlabel="time [s]", ylabel="tension [N]")
     error.set_ylim(bottom=0.0)
     changes = t[1:][(np.diff(run.wrench, axis=0) != 0.0).any(axis=1)][:1]
