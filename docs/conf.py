@@ -86,7 +86,10 @@ default_role = "formula"
 autosummary_ignore_module_all = False
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
-autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Direction")}
+# signatures name these types, and do not write them out
+SHORT = "Applied Array ArrayLike Codes Direction Flags Joints LoadsLike OfCables Panels "
+SHORT += "RowsOfLoads SlidingLike TensionOf WrenchesLike"
+autodoc_type_aliases = {name: name for name in SHORT.split()}
 TypeAliasForwardRef.__repr__ = lambda self: self.name  # type: ignore[method-assign]  # in unions
 autodoc_preserve_defaults = True
 napoleon_numpy_docstring = False
