@@ -161,7 +161,7 @@ class Equilibrium(Result, Loaded):
 
         It is False for a neutral state, for example if all cables are slack. A joint that touches
         its stop without a torque counts as free, even if this stop blocks the unstable motion.
-        Where cables slide, it is enough that the eigenvalues of K_θ have positive real parts.
+        Where cables slide, it is enough that the eigenvalues of `K_θ` have positive real parts.
         """
         values = self._motions[0]
         if self._skews:
