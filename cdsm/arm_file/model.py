@@ -5,7 +5,6 @@ A check of several keys is a validator of the last of them: so all faults of a f
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Callable, Mapping
@@ -15,7 +14,6 @@ from typing import Annotated, Any, Final, TypeVar, cast, get_type_hints
 
 from pydantic import (
     AfterValidator,
-    BeforeValidator,
     Discriminator,
     Field,
     PlainValidator,
@@ -24,12 +22,12 @@ from pydantic import (
 )
 from pydantic import ValidationInfo as Info
 
+from cdsm.arm_file.motor_entries import MotorTables, motors_of
 from cdsm.arm_file.path_entries import Label, PathEntry
 from cdsm.cable import SETTINGS, Cable, Cables, serpentine_cables
 from cdsm.dead_loads import Load
 from cdsm.errors import LINES, FileError, GeometryError, InvalidInput, listed, warn
 from cdsm.geometry import Geometry, toml
-from cdsm.motors import Motor, MotorControl, checked_motors, require_cables
 from cdsm.rigid_body import GRAVITY
 from cdsm.springs import JointSpring
 from cdsm.support import records
@@ -282,48 +280,6 @@ class Urdf:
     text: Annotated[str | None, AfterValidator(_one_source), Field(validate_default=True)] = None
 
 
-@record
-class _Motor:
-    cables: dict[str, records.Number]
-    stiffness: Annotated[records.Number, records.in_range("spring")] = math.inf
-    control: MotorControl = "position"
-
-
-def _by_name(value: object) -> object:
-    """Return tables [[motors]] as [motors.NAME]."""
-    if not isinstance(value, list):
-        return value
-    tables: dict[str, Any] = {}
-    for i, table in enumerate(value, start=1):
-        if not isinstance(table, dict) or not isinstance(table.get("name"), str):
-            raise CrossFaults([f"[{i}].name: is missing"])
-        name = table["name"]
-        if name in tables:
-            raise CrossFaults([f"[{i}].name: {name!r} is used twice"])
-        tables[name] = {key: entry for key, entry in table.items() if key != "name"}
-    return tables
-
-
-_Motors = Annotated[dict[str, _Motor] | None, BeforeValidator(_by_name)]
-
-
-def _moving(tables: dict[str, _Motor] | None, info: Info) -> tuple[Motor, ...]:
-    """Build the motors of the tables [motors.NAME], whose cables exist."""
-    faults = list[str]()
-    motors = []
-    cables = info.data.get("cables")
-    for name, table in (tables or {}).items():
-        try:
-            motors.append(Motor(name, **vars(table)))
-            if cables:
-                require_cables(motors[-1], cables)
-        except ValueError as error:
-            faults += records.faults_at(name, error)
-    if faults:
-        raise CrossFaults(faults)
-    return checked_motors(motors, cables) if cables else tuple(motors)
-
-
 _Tables = Annotated[
     Annotated[dict[Annotated[str, AfterValidator(_name_of_one)], _Settings], Tag(ONE)]
     | Annotated[tuple[_Routed, ...], Field(strict=False), Tag(EACH)],
@@ -419,7 +375,7 @@ class ArmFile(_Settings, _Wires):
     urdf: Annotated[Urdf | None, AfterValidator(_alone)] = None
     lead: Annotated[records.LengthOrZero | None, AfterValidator(_of_routed)] = None
     cables: Annotated[_Tables, WrapValidator(_built), Field(validate_default=True)] = None  # type: ignore[assignment]
-    motors: Annotated[_Motors, AfterValidator(_moving)] = ()  # type: ignore[assignment]
+    motors: Annotated[MotorTables, AfterValidator(motors_of)] = ()  # type: ignore[assignment]
 
 
 def _placed(fault: str, described: dict[str, Any]) -> str:
