@@ -300,7 +300,7 @@ class Chunk:
         return (
             self._kernels.COMPILED
             and self._table.coupling is None
-            and (self._paths is None or bool(self._paths.groove.all()))
+            and (self._paths is None or not self._paths.coupled)
             and self._names.isdisjoint(TERMS_OF_K)
             and self._rows.arm.motors.yielding is None
             and wanted <= {"along"}
@@ -381,7 +381,7 @@ class Chunk:
         touching = self._rows.touching
         assert paths is not None
         assert touching is not None
-        if paths.groove.all():
+        if not paths.coupled:
             touching.kernels.add_shifts(self._table.arm, paths, at, contacts, F, K, size)
             return
         count = len(F) * F.shape[2]  # not eliminated in place, so the size is not needed

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,8 @@ class PathArrays(NamedTuple):
     node: Indices  # sites of the routing that are arrivals, then those of departures (2T,)
     fixed: Array  # length of cables without arcs that no joint changes (C,) [m]
     pieces: Indices  # segments at grooves, pulley from which they come, and to which they go; or −1
+    helices: Indices  # smooth pulleys between sites, segments before and behind; on a rim −1 (H, 3)
+    coupled: bool  # whether smooth pulleys have neighbours, which the kernels do not know
 
 
 class ContactArrays(NamedTuple):
@@ -83,6 +86,10 @@ def paths_of(arm: Manipulator, touches: tuple[bool, ...]) -> PathArrays:
                 side[int(contact < T)] = contact % T
         if max(side) >= 0 and routing.sign[s].any():
             pieces.append((s, *side))
+    segment = np.where(ends.free, ends.segment[ends.piece] if ends.segment.size else 0, -1)
+    smooth = np.flatnonzero(~wraps.groove[chosen])
+    alone = [t for t, end in pairwise(low) if end - t == 1]
+    helices = [(t, segment[t], segment[T + t]) for t in smooth.tolist() if t in alone]
     return PathArrays(
         frame=wraps.row,
         point=wraps.point,
@@ -99,6 +106,8 @@ def paths_of(arm: Manipulator, touches: tuple[bool, ...]) -> PathArrays:
         node=frozen(pattern.contact.copy()),
         fixed=routing.fixed,
         pieces=frozen(np.array(pieces, np.intp).reshape(-1, 3)),
+        helices=frozen(np.array(helices, np.intp).reshape(-1, 3)),
+        coupled=len(helices) < len(smooth),
     )
 
 

@@ -1,8 +1,10 @@
-"""Kernel of cables over grooved pulleys: what contacts shift beside the planes of the grooves.
+"""Kernel of cables over pulleys: what shifts of contacts beside the planes of the pulleys add to K.
 
 The formulas are those of :mod:`cdsm.pulleys.contact_shifts`, for W postures side by side as in
 :mod:`cdsm.batch.kernels`. K_A and K_B act across the piece, symmetric and without trace, and so
 does their sum K: K² = k² there, and N D = (ℓ D − K D)/(ℓ² − k²) without its part along the piece.
+On a smooth pulley between two sites, the two equations for η and σ have the solution of
+:func:`_fill_slipped`.
 """
 
 from __future__ import annotations
@@ -100,6 +102,58 @@ def _fill_pair(
             out[w] -= own[1, x, w] * other[1, x, w] * over[w]
 
 
+@inner_loop
+def _fill_across(u: Array, axis: Array, contact: Array, centre: Array, out: Array) -> None:
+    """Fill b = n × u of a contact with a smooth cylinder."""
+    for w in lanes(out):
+        a = axis[0, w]
+        b = axis[1, w]
+        c = axis[2, w]
+        x = contact[0, w] - centre[0, w]
+        y = contact[1, w] - centre[1, w]
+        z = contact[2, w] - centre[2, w]
+        height = a * x + b * y + c * z
+        x = x - height * a
+        y = y - height * b
+        z = z - height * c
+        over = 1.0 / np.sqrt(x * x + y * y + z * z)
+        out[0, w] = over * (y * u[2, w] - z * u[1, w])
+        out[1, w] = over * (z * u[0, w] - x * u[2, w])
+        out[2, w] = over * (x * u[1, w] - y * u[0, w])
+
+
+@inner_loop
+def _fill_kink(u: Array, across: Array, own: Array, arrives: bool, out: Array) -> None:
+    """Fill ℓ C: b·d − ℓ b·w on arrival, −b·d on departure."""
+    for w in lanes(out):
+        d = across[0, w] * own[1, 0, w] + across[1, w] * own[1, 1, w] + across[2, w] * own[1, 2, w]
+        turn = across[0, w] * own[0, 0, w] + across[1, w] * own[0, 1, w]
+        turn = turn + across[2, w] * own[0, 2, w]
+        out[w] = d - turn / u[3, w] if arrives else -d
+
+
+@inner_loop
+def _fill_slipped(kink: Array, other: Array, over: Array, out: Array) -> None:
+    """Fill X X′/(ℓ₁ + s + ℓ₂) − ℓ₁ C₁ C₁′ − ℓ₂ C₂ C₂′ of two joints, with X = ℓ₁ C₁ − ℓ₂ C₂.
+
+    ``over`` (3, W) are 1/ℓ₁, 1/ℓ₂, which are 0 on a rim, and 1/(ℓ₁ + s + ℓ₂).
+    """
+    for w in lanes(out):
+        X = (kink[0, w] - kink[1, w]) * (other[0, w] - other[1, w])
+        out[w] = X * over[2, w] - kink[0, w] * other[0, w] * over[0, w]
+        out[w] -= kink[1, w] * other[1, w] * over[1, w]
+
+
+@inner_loop
+def _add_to(K: Array, size: Array, i: int, j: int, pair: Array) -> None:
+    """Add to K symmetrically, and to the size of its diagonal."""
+    K[i, j] += pair
+    if i == j:
+        size[j] += np.abs(pair)
+    else:
+        K[j, i] += pair
+
+
 @kernel
 def add_shifts(
     arm: ArmArrays,
@@ -110,8 +164,9 @@ def add_shifts(
     K: Array,
     size: Array,
 ) -> None:
-    """Add to the active term K[:, 0] what contacts shift in grooves beside whose plane cables run.
+    """Add to the active term K[:, 0] what shifts of contacts beside the planes of pulleys do.
 
+    Smooth pulleys that follow others are not known here: :mod:`cdsm.batch.smooth_rows` has them.
     ``size`` gets the magnitudes of the diagonal; the arguments are those of ``fill_stiffness``.
     """
     T = len(paths.centre)
@@ -123,6 +178,9 @@ def add_shifts(
     across = np.empty((3, W))
     stiff = np.empty(W)
     pair = np.empty(W)
+    n = len(arm.parent)
+    kink = np.empty((n, 2, W))  # ℓ C of each joint, on arrival and departure
+    over = np.empty((3, W))
     for b in range(len(F)):
         for piece in paths.pieces:
             s = piece[0]
@@ -162,8 +220,34 @@ def add_shifts(
                     i = arm.path[s, k]
                     _fill_pair(u[3], own[k], bent[k], own[t], bent[t], pair)
                     pair *= F[b, arm.ends[s, 0]]
-                    K[b, 0, i, j] += pair
-                    if i == j:
-                        size[b, j] += np.abs(pair)
-                    else:
-                        K[b, 0, j, i] += pair
+                    _add_to(K[b, 0], size[b], i, j, pair)
+        for helix in paths.helices:
+            p = helix[0]
+            kink[:] = 0.0
+            over[:] = 0.0
+            over[2] = contacts.arc[b, p]
+            centre = contacts.entry[b, paths.centre[p]]
+            for side in range(2):  # arrival, departure
+                s = helix[1 + side]
+                if s < 0:
+                    continue
+                u = at.segment[b, s]
+                contact = contacts.contact[b, T + p if side else p]
+                _fill_across(u, contacts.axis[b, p], contact, centre, across)
+                over[side] = u[3]
+                over[2] += 1.0 / u[3]
+                for t in range(m):
+                    j = arm.path[s, t]
+                    sign = arm.sign[s, t]
+                    if sign != 0.0:
+                        _fill_motions(u, at.motion[b, s, t], at.axis[b, j], sign, own[t])
+                        _fill_kink(u, across, own[t], side == 0, kink[j, side])
+            over[2] = 1.0 / over[2]
+            c = paths.cable[p]
+            for j in range(n):
+                if arm.pulls[c, j]:
+                    for i in range(j + 1):
+                        if arm.pulls[c, i]:
+                            _fill_slipped(kink[i], kink[j], over, pair)
+                            pair *= F[b, c]
+                            _add_to(K[b, 0], size[b], i, j, pair)

@@ -1,6 +1,6 @@
-"""Shifts along smooth cylinders at many postures, by numpy: they couple all pulleys of a cable.
+"""Shifts at many postures by numpy, where smooth pulleys follow others: their shifts are coupled.
 
-The kernel ``add_shifts`` has those of grooves.
+The kernel ``add_shifts`` has those of grooves, and of smooth pulleys between two sites.
 """
 
 from __future__ import annotations

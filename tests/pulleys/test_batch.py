@@ -15,9 +15,9 @@ OUTPUTS = ("joint", "active", "passive", "cable_lengths", "length_jacobian", "al
 REACH = np.array([0.1, 1.2, 1.2, 1.2])
 
 
-def mixed() -> cdsm.Manipulator:
+def mixed(*, chained: bool = True) -> cdsm.Manipulator:
     """The finger with a groove in every second pulley, also of those that follow each other."""
-    arm = finger(plane=False)
+    arm = finger(plane=False, chained=chained)
     number = count()
     cables = []
     for cable in arm.cables:
@@ -36,8 +36,15 @@ def mixed() -> cdsm.Manipulator:
 )
 @pytest.mark.parametrize(
     "arm",
-    [finger(), finger(plane=False), finger(plane=False, groove=False), mixed()],
-    ids=["in the plane", "beside grooves", "smooth", "mixed"],
+    [
+        finger(),
+        finger(plane=False),
+        finger(plane=False, groove=False),
+        finger(plane=False, groove=False, chained=False),
+        mixed(),
+        mixed(chained=False),
+    ],
+    ids=["in the plane", "beside grooves", "smooth", "smooth, alone", "mixed", "mixed, alone"],
 )
 def test_rows_are_postures(
     arm: cdsm.Manipulator,
@@ -52,7 +59,7 @@ def test_rows_are_postures(
     rng = np.random.default_rng(0)
     q = rng.uniform(-REACH, REACH, (60, 4))
     q[:30, 0] = 0.0
-    F = rng.uniform(5.0, 30.0, (60, 9))
+    F = rng.uniform(5.0, 30.0, (60, len(arm.cables)))
     batch = cdsm.evaluate(arm, q, F, outputs=OUTPUTS, direction="z")
     patterns = set()
     for i in range(60):
