@@ -8,7 +8,7 @@ from typing import Any, final
 import numpy as np
 
 from cdsm.cable import holes_like, require_own_cables, serpentine_cables
-from cdsm.errors import InvalidInput
+from cdsm.errors import CdsmError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.parameters import PARAMETERS, Parameter, PartKind
 from cdsm.support.validation import instance, one_of, scalar, sequence_of, text
@@ -103,6 +103,19 @@ class ArmParameters:
             if value is not None and low < value < high:
                 return value
         return None
+
+    def require_arms(self, name: str, low: float, high: float) -> None:
+        """Raise InvalidInput if there is no arm at an end of the bounds of a parameter, in SI."""
+        unit, size = self.unit(name)
+        for side, value in (("low", low), ("high", high)):
+            try:
+                self(**{name: value})
+            except CdsmError as error:
+                given = f"{side} = {value / size:g} {unit}".rstrip()
+                problem = (
+                    f"the bound {given} is given, but no arm has it: {error} Give closer ones."
+                )
+                raise InvalidInput(name, problem) from None
 
     def values(self, name: str) -> list[float]:
         """Return the values in SI that the parameter ``name`` has in the joints or cables."""

@@ -157,7 +157,7 @@ class InfeasibleTension(CdsmError):
     leave, and ``joint`` the name of the joint with most of it. Of the cables without a fixed
     tension, ``binding`` names those at a bound then, and ``relaxation`` [N] is the least widening
     of all bounds that helps, or inf. ``fixed`` names the cables if their fixed tensions prevent it.
-    ``hint`` becomes part of the message.
+    ``hint`` and ``cause`` become part of the message.
 
     Example:
         >>> import cdsm
@@ -181,6 +181,7 @@ class InfeasibleTension(CdsmError):
         names: Texts = (),
         fixed: Texts = (),
         hint: str = "",
+        cause: str = "",
     ) -> None:
         self.missing = missing
         self.joint = joint
@@ -197,8 +198,8 @@ class InfeasibleTension(CdsmError):
             step = 10.0 ** (math.floor(math.log10(relaxation or 1.0)) - 3)
             wider = math.ceil(relaxation / step) * step
             at = ", ".join(binding) or "none"
-            advice = f"Widening every bound by {wider:.4g} N would be enough (cables at a bound: "
-            advice += f"{at}). Reduce the load{hint and f', or {hint}'}."
+            advice = f"{cause}Widening every bound by {wider:.4g} N would be enough (cables at a "
+            advice += f"bound: {at}). Reduce the load{hint and f', or {hint}'}."
         if len({*units}) > 1:  # torques and forces have no sum
             order = sorted(range(len(units)), key=lambda j: (names[j] != joint, -abs(missing[j])))
             lacks = [j for j in order if abs(missing[j]) > 1e-9 * abs(missing).max()]

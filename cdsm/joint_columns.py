@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from cdsm.errors import warn
 from cdsm.joints import require_followers
 from cdsm.manipulator import Manipulator
 from cdsm.support.tables import ANGLE, SLIDE, Columns, Row
 from cdsm.support.values import Array
+
+TINY: Final = math.radians(0.2)
+"""Largest angle [rad] in degrees that looks as if it is in radians."""
 
 
 class JointColumns(NamedTuple):
@@ -39,12 +44,22 @@ class JointColumns(NamedTuple):
         def column(name: str) -> Array:
             return np.array([table.number(row, name) for row in rows])
 
+        if rows and rows[0] is table.rows[0]:
+            self._doubt_radians(table)
         rest = np.zeros(len(rows))
         names = self.arm.joint_names
         q = np.transpose([column(name) if name in table else rest for name in names])
         logged = {name: column(name) for name in self._followers if name in table}
         require_followers(self.arm.body.coupling, self.arm.body.all_joints, q, logged)
         return q
+
+    def _doubt_radians(self, table: Columns) -> None:
+        """Warn of a file whose angles are so small that they may be in radians."""
+        names = [name for name in self.arm.joint_names if table.unit.get(name) in ("deg", "°")]
+        angles = [table.number(row, name) for name in names for row in table.rows]
+        if 0.0 < max(map(abs, angles), default=0.0) < TINY:
+            small = f"{table.path}: all angles are below {math.degrees(TINY):g}°"
+            warn(f"{small}, as if in radians. If they are, call the columns {names[0]} [rad], …")
 
     @property
     def _followers(self) -> list[str]:

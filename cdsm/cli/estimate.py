@@ -49,17 +49,21 @@ def estimate(
         if name in links:
             raise misuse("--link", f"{name!r} is given twice; give its rows at once.")
         links[name] = what.split(",") if "," in what else what or "force"
-    found = {
-        reading.label: cdsm.estimate_load(
-            reading.posture,
-            reading.motor_tension,
-            links or None,
-            tension_std=tension_std,
-            angle_std=angle_std * options.joint_scales(robot),
-            sliding={"in": 1, "out": -1, None: None}[sliding],
-        )
-        for reading in read_load_cells(readings, robot)
-    }
+    found = {}
+    for reading in read_load_cells(readings, robot):
+        try:
+            found[reading.label] = cdsm.estimate_load(
+                reading.posture,
+                reading.motor_tension,
+                links or None,
+                tension_std=tension_std,
+                angle_std=angle_std * options.joint_scales(robot),
+                sliding={"in": 1, "out": -1, None: None}[sliding],
+            )
+        except cdsm.InvalidInput as error:
+            if error.name == "motor_tensions":  # else it is an option
+                raise cdsm.FileError(readings, f"{reading.label}: {error}") from None
+            raise
     write_picture(figure, [*found.values()][-1].plot)
     numbers = {name: each.to_dict() | {"warnings": each.warnings} for name, each in found.items()}
     texts = [f"{name}\n{each}" for name, each in found.items()]

@@ -101,6 +101,7 @@ def identify_parameters(
     bounds = {name: ranges[name] or _usual(name, present[name]) for name in ranges}
     for name, (low, high) in bounds.items():
         size = units[name][1]
+        parameters.require_arms(name, size * low, size * high)
         typical = parameters.start(name, size * low, size * high)
         if typical is not None:
             starts.setdefault(name, typical / size)

@@ -162,9 +162,6 @@ def _by_link(option: str, texts: Iterable[str] | None, arm: cdsm.Manipulator) ->
     return loads
 
 
-_TINY = 0.2  # largest angle [deg] that looks as if it is in radians
-
-
 def joint_scales(arm: cdsm.Manipulator) -> Array:
     """Return the SI value (nv,) of the unit of each joint on the command line: 1° or 1 mm."""
     import numpy as np
@@ -176,6 +173,9 @@ def joint_scales(arm: cdsm.Manipulator) -> Array:
 
 def joint_coordinates(text: str | None, arm: cdsm.Manipulator) -> Array:
     """Return the joint coordinates of --angles (nv,) in SI; 0 without this option."""
+    import math
+
+    from cdsm.joint_columns import TINY
     from cdsm.support.validation import scalar
 
     names = arm.joint_names
@@ -192,8 +192,9 @@ def joint_coordinates(text: str | None, arm: cdsm.Manipulator) -> Array:
         if len(values) > 1 and arm.body.branches:
             note(f"--angles are those of {', '.join(names)}, in this order: the robot branches")
     turning = values if not arm.slides.any() else []
-    if 0.0 < max(map(abs, turning), default=0.0) < _TINY:
-        note(f"all --angles are below {_TINY:g}°: they are in degrees, not in radians")
+    tiny = math.degrees(TINY)
+    if 0.0 < max(map(abs, turning), default=0.0) < tiny:
+        note(f"all --angles are below {tiny:g}°: they are in degrees, not in radians")
     pairs = zip(names, values * arm.nv if len(values) == 1 else values, strict=True)
     return joint_scales(arm) * [scalar(f"--angles of {name}", value) for name, value in pairs]
 
@@ -302,6 +303,8 @@ def read_path(path: Path, arm: cdsm.Manipulator, *, target: bool = True) -> Moti
         return np.array([table.number(row, name) for row in table.rows])
 
     has_tips = any(axis in table for axis in "xyz")
+    for axis in "xyz" if has_tips else "":
+        table.factor(axis)  # raises if it is missing
     if has_tips == any(name in table for name in arm.joint_names):
         which = "both" if has_tips else "neither"
         table.refuse(

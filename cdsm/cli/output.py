@@ -129,8 +129,16 @@ def write_picture(path: Path | None, draw: Callable[[], Axes | Panels]) -> None:
     write(path, lambda file: cdsm.plots.save_figure(draw(), file))
 
 
-def _show(message: Warning | str, *_: object, **__: object) -> None:
-    typer.secho(f"warning: {message}", fg="yellow", err=True)
+def _show_once() -> Callable[..., None]:
+    """Return what prints each warning once, in one line."""
+    shown = set[str]()
+
+    def show(message: Warning | str, *_: object, **__: object) -> None:
+        if (text := str(message)) not in shown:
+            shown.add(text)
+            typer.secho(f"warning: {text}", fg="yellow", err=True)
+
+    return show
 
 
 def reported(function: Callable[..., int]) -> Callable[..., None]:
@@ -143,7 +151,7 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
     def command(**arguments: Any) -> None:
         try:
             with warnings.catch_warnings():
-                warnings.showwarning = _show
+                warnings.showwarning = _show_once()
                 code = function(**arguments)
         except (KeyboardInterrupt, SystemError) as error:
             # Ctrl-C within a compiled kernel raises SystemError from KeyboardInterrupt

@@ -16,6 +16,8 @@ from cdsm.support.tables import NEWTONS, TEXT, Columns
 from cdsm.support.validation import instance
 from cdsm.support.values import Array, frozen
 
+_NOISE = 0.1  # [rad], or of the arm's length: so far beyond a limit, an encoder is not just noisy
+
 
 class LoadCellReading(NamedTuple):
     """What was read at one time.
@@ -57,7 +59,10 @@ def read_load_cells(path: str | os.PathLike[str], arm: Manipulator) -> tuple[Loa
     readings = []
     for row, label in zip(table.rows, labels, strict=True):
         try:
-            pose = arm.at(joints.angles(table, [row])[0], check_limits=False)
+            q = joints.angles(table, [row])[0]
+            noise = np.where(arm.slides, _NOISE * arm.length, _NOISE)
+            far = bool(((q < arm.lower - noise) | (q > arm.upper + noise)).any())
+            pose = arm.at(q, check_limits=far)
         except InvalidInput as error:
             raise FileError(path, f"line {row[0]}: {error}") from None
         F = frozen(np.array([table.number(row, name) for name in cables]))

@@ -117,6 +117,9 @@ def fit_parameters(
             "free fewer parameters. A stiffness or a coordinate counts as one, a loop as its "
             "readings minus one, as its offset is unknown.",
         )
+    if isinstance(model_of, ArmParameters):
+        for name in set(bounds) & set(model_of.names):
+            model_of.require_arms(name, *bounds[name])
     problem = LeastSquares(model_of, tension_of, measurements, bounds)
     first = _start(problem, start)
     with problem.counted("identifying parameters: predictions"):

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import FileError, InvalidInput
+from cdsm.errors import FileError, InvalidInput, warn
 from cdsm.identification.cells import LENGTH, axis_in, link_in
 from cdsm.identification.weight_loop import WeightLoop
 from cdsm.joint_columns import JointColumns
@@ -108,6 +108,9 @@ def _tensions(table: Columns, cables: Sequence[str]) -> list[str]:
     return ["minimum"]
 
 
+_AGAINST = -0.9  # correlation of force and displacement below which signs are doubted
+
+
 class _LoopsFile(NamedTuple):
     """A file of loops, and the columns in which it has what was read and the tensions."""
 
@@ -151,7 +154,19 @@ class _LoopsFile(NamedTuple):
             fields["displacements"] = self._displacements(label, rows)
         fields["angles"] = tuple(self.joints.angles(table, rows[:1])[0].tolist())
         fields["forces"] = tuple(table.number(row, "force") for row in rows)
+        if self.readings:
+            self._doubt_signs(label, fields)
         return fields
+
+    def _doubt_signs(self, label: str, fields: dict[str, Any]) -> None:
+        """Warn of a place that moves against the force on it, as no stable arm moves."""
+        force = np.array(fields["forces"]) - np.mean(fields["forces"])
+        moved = fields["displacements"]
+        moved = moved if moved.ndim == 1 else moved @ np.array(fields["direction"])
+        moved = moved - moved.mean()
+        if force @ moved < _AGAINST * np.linalg.norm(force) * np.linalg.norm(moved):
+            where = f"{self.table.path}: test {label}: its readings go against the force"
+            warn(f"{where}. Check the signs of force and displacement, and the direction.")
 
     def _displacements(self, label: str, rows: list[Row]) -> Array:
         """Return what was read (n,), or (n, 3) [m]."""

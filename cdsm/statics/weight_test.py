@@ -278,7 +278,7 @@ class WeightTest(Result, Plotted):
         slides = f"at {self.sliding_load:.4g} N they slide: from here on the tangent is at most "
         slides += f"{100.0 * (SLIDING - 1.0):.0f} % above that of the same load without friction"
         if self.sliding_load == math.inf:
-            slides = "under this weight the arm does not slide yet: hang more"
+            slides = "under this weight the cables do not slide throughout yet: hang more"
         return [
             f"below {self.breakaway_load:.4g} N all cables stick: a weight measures "
             f"{stiffness_text(self.stuck)}",

@@ -37,7 +37,7 @@ def infeasible(
     names = pose.arm.cables.names
     missing = (b - A @ F) * arm * force
     tight = free & (np.minimum(F - low, high - F) <= OPTIMALITY)
-    one_sided = _one_sided(problem) if math.isinf(widening) else []
+    one_sided = _one_sided(problem)
     lever = np.where(pose.arm.slides, pose.arm.length, 1.0)  # of a force, to compare it
     worst = one_sided[0] if one_sided else int(abs(missing * lever).argmax())
     return InfeasibleTension(
@@ -51,6 +51,7 @@ def infeasible(
         hint=_sides(pose.arm, problem, one_sided) + too_few_cables(pose.arm)
         if math.isinf(widening)
         else advice(pose.arm, force * F, force * low, force * high, free),
+        cause=_sides(pose.arm, problem, one_sided),
     )
 
 

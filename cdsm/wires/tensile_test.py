@@ -190,6 +190,11 @@ def _find_header(sheet: _Sheet, columns: Sequence[str] | None) -> _Header:
             end = next((k for k in range(first, len(counts)) if counts[k] < 2), len(counts))
             headers.append(_Header(row, units, first, end - first, _fitting(cells, columns)))
     best = max(headers, key=lambda header: (header.names_both, header.points), default=None)
+    if not sheet.rows:
+        sheet.refuse("is empty; give a header and a line for each reading, as TEST.csv has.")
+    if not any(counts):
+        opening = ", ".join(sheet.rows[0])
+        sheet.refuse(f"holds no readings: no line has numbers; its first line is {opening!r}.")
     if best is None or not best.names_both:
         names = sheet.rows[best.row if best else 0] if sheet.rows else []
         sheet.refuse(
