@@ -56,7 +56,8 @@ class JointColumns(NamedTuple):
     def _doubt_radians(self, table: Columns) -> None:
         """Warn of a file whose angles are so small that they may be in radians."""
         names = [name for name in self.arm.joint_names if table.unit.get(name) in ("deg", "°")]
-        angles = [table.number(row, name) for name in names for row in table.rows]
+        cells = [(row, name) for name in names for row in table.rows if table.text(row, name)]
+        angles = [table.number(*cell) for cell in cells]
         if 0.0 < max(map(abs, angles), default=0.0) < TINY:
             small = f"{table.path}: all angles are below {math.degrees(TINY):g}°"
             warn(f"{small}, as if in radians. If they are, call the columns {names[0]} [rad], …")

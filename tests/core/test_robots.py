@@ -47,6 +47,10 @@ def test_a_joint_that_all_cables_pull_to_one_side_is_named() -> None:
         cdsm.distribute_tension(pose, 5.0)
     assert told.value.joint == "slide"
     assert "add one that pulls the other way" in str(told.value)
+    level = slider(one_sided=True).with_gravity((0.0, 0.0, 0.0)).at([0.0, 0.0])
+    with pytest.raises(cdsm.InfeasibleTension, match=r"All cables pull slide .* Widening") as told:
+        cdsm.distribute_tension(level, 5.0)  # at 0 N it rests
+    assert told.value.joint == "slide"
     balanced = cdsm.distribute_tension(slider(one_sided=False).at([0.0, 0.0]), 5.0)
     assert abs(balanced.residual).max() < 1e-9
 

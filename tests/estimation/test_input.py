@@ -1,17 +1,43 @@
 """Readings and questions that are wrong are refused, with the name of what is wrong."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import cdsm
+from cdsm.cli import app
+from cdsm.estimation.files import read_load_cells
 from tests.estimation.test_loads import readme
 from tests.support.pulleys import finger
 
 POSE = readme(0.1)
 F = np.full(12, 60.0)
 NEGATIVE = np.r_[F[:-1], -5.0]
+
+SAMPLE = Path(__file__).parents[2] / "examples" / "data" / "LOAD_CELLS.csv"
+
+
+def test_faults_of_a_file_name_the_reading(tmp_path: Path) -> None:
+    """A tension below 0 N, and angles that no encoder reads, as degrees that are called radians."""
+    path = tmp_path / "cells.csv"
+    arm = str(Path(__file__).parents[2] / "examples" / "arm.toml")
+    words = ["estimate", arm, str(path), "--tension-std", "0.5"]
+    text = SAMPLE.read_text(encoding="utf-8")
+    for wrong, said in (
+        (text.replace(",46.0,", ",-46.0,"), "cells.csv: empty: motor_tensions: -46 N given for"),
+        (text.replace("[deg]", "[rad]"), "cells.csv: line 4: q: joint1_1 = 573.5° is outside"),
+    ):
+        path.write_text(wrong, encoding="utf-8")
+        result = CliRunner().invoke(app, words)
+        assert result.exit_code == 1
+        assert said in " ".join(result.output.split())
+    noisy = text.replace("\nempty,10.01,", "\nempty,20.9,")  # beyond 20.05° by less than noise
+    path.write_text(noisy, encoding="utf-8")
+    assert len(read_load_cells(path, cdsm.Manipulator.read(arm))) == 2
+
 
 WRONG: tuple[tuple[dict[str, Any], str], ...] = (
     ({"motor_tensions": F[1:]}, r"motor_tensions: shape \(11,\) given, \(12,\) needed"),

@@ -1,5 +1,6 @@
 """Loops of weight tests and positions of tips from CSV files."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +78,25 @@ def test_three_axes_measured_tensions_and_tests_without_readings(tmp_path: Path)
 def test_faults_name_line_and_column(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(cdsm.FileError, match=f"(?s)loops.csv.*{said}"):
         read(tmp_path, GOOD.replace(old, new, 1))
+
+
+def test_readings_against_the_force_and_angles_in_radians_are_doubted(tmp_path: Path) -> None:
+    """No stable arm moves against a force on it; 20 degrees are 0.35, and below 0.2."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read(tmp_path, GOOD)
+    against = GOOD.replace(",8,0.25", ",8,-0.25")
+    with pytest.warns(cdsm.CdsmWarning, match=r"loops.csv: test up: its readings go against the"):
+        read(tmp_path, against)
+    head = "test,direction,minimum [N],force [N],x [mm],y [mm],z [mm]\n"
+    with pytest.warns(cdsm.CdsmWarning, match="test a: its readings go against the force"):
+        read(tmp_path, f"{head}a,-z,50,0,0,0,0\na,,,5,-0.1,0,0.2\n")
+    small = GOOD.replace("up,20,", "up,0.15,").replace("side,-10,", "side,-0.1,")
+    with pytest.warns(cdsm.CdsmWarning, match=r"all angles are below 0.2°.* joint1 \[rad\]"):
+        read(tmp_path, small)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read(tmp_path, small.replace("joint1 [deg]", "joint1 [rad]"))
 
 
 def test_empty_columns_and_rows_of_a_spreadsheet_do_not_count(tmp_path: Path) -> None:

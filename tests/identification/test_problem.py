@@ -1,6 +1,7 @@
 """Measurements with weights that are not small: identification compares a secant with a secant."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,26 @@ def test_a_weight_on_strands_at_low_tension_does_not_measure_the_tangent() -> No
     lifted = cdsm.weight_test(pose, pull, [0.0, 0.0, 5.0]).stiffness
     assert predicted(up, arm) == pytest.approx(lifted, rel=1e-12)
     assert abs(lifted / secant - 1.0) > 0.1
+
+
+def test_bounds_without_an_arm_are_refused() -> None:
+    arm = cdsm.Manipulator.read(Path(__file__).parents[2] / "examples" / "arm.toml")
+    model = cdsm.ArmParameters(arm, ("friction", "hole_radius"))
+    loop = cdsm.WeightLoop(
+        direction="-z",
+        angles=(0.0,) * 8,
+        forces=(0.0, 2.0, 0.0),
+        displacements=(0.0, 1e-3, 1e-4),
+        displacement_std=1e-5,
+        minimum=20.0,
+    )
+    for free, said in (
+        ({"friction": (-1.0, 0.5)}, "friction: the bound low = -1 is given, but no arm has it: fr"),
+        ({"hole_radius": (0.01, 1e9)}, r"hole_radius: the bound high = 1e\+12 mm is given, but no"),
+    ):
+        with pytest.raises(cdsm.InvalidInput, match=said):
+            cdsm.identify(model, [loop], free)
+    model.require_arms("friction", 0.0, 1.0)
 
 
 def test_parameters_are_recovered_from_secants_with_a_payload() -> None:

@@ -102,7 +102,8 @@ def test_columns_of_one_name_are_told_apart_by_number(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "given", "said"),
     [
-        ("", {}, "no header that names displacement and force in its first 50 lines"),
+        ("", {}, "is empty; give a header and a line for each reading"),
+        ("displacement [mm],force [N]\n", {}, "holds no readings: no line has numbers; its first"),
         ("weight [N],force [N]\n0,0\n", {}, "there are weight [N], force [N]; which"),
         ("Zeit [s];Weg [mm];Kraft [N]\n0;0;0\n", {}, "give --columns Weg,Kraft, or, in Python"),
         ("s,F\n0,0\n", {"columns": ("Weg", "F")}, "names Weg and F"),
