@@ -184,9 +184,7 @@ def assemble(pose: Any, tension: ArrayLike) -> Assembly:
     of = getattr(given, "posture", pose)
     if not pose.equals(of):
         raise InvalidInput("tension", "is of another posture; distribute it at this one.")
-    count = len(arm.cables)
-    F = vector("tension", given, count, "one tension [N] per cable", "tension")
-    arm.cables.require_pulling("tension", F)
+    F = arm.cables.tension_vector(given)
     lengths = arm.laws.original_lengths(pose.cable_lengths, F)
     arm.laws.require_wire(lengths, F)
     return Assembly(posture=pose, tension=F, free_lengths=lengths)

@@ -24,6 +24,7 @@ from cdsm.support.validation import (
     one_of,
     positive,
     text,
+    vector,
 )
 from cdsm.support.values import Array
 from cdsm.wires.catalogue import label
@@ -223,6 +224,12 @@ class Cables(tuple[Cable, ...]):
     def number_of(self, name: object) -> int:
         """Return the place of a cable in every (C,) array; InvalidInput if there is no such one."""
         return self.names.index(one_of("cable", name, self.names))
+
+    def tension_vector(self, tension: ArrayLike) -> Array:
+        """Return tensions (C,) [N]; InvalidInput if it is not one for each cable, or negative."""
+        F = vector("tension", tension, len(self), "one tension [N] per cable", "tension")
+        self.require_pulling("tension", F)
+        return F
 
     def require_pulling(self, argument: str, tension: Array) -> None:
         """Raise InvalidInput if an entry of an ``argument``, tensions (…, C) [N], is negative."""

@@ -409,8 +409,7 @@ class Manipulator(ComputedArm):
             >>> (1e3 * wire[:3]).round(2).tolist()
             [0.5, 0.5, 0.0]
         """
-        if instance("pose", pose, Posture).arm is not self and pose.arm != self:
-            raise InvalidInput("pose", "is of another arm; take arm.at(q).")
+        require_own(self, pose)
         return assemble(pose, tension)
 
     def with_gravity(self, gravity: Direction) -> Manipulator:
@@ -432,3 +431,9 @@ def _read(cables: CablesOrFile | None) -> Cable | Sequence[Cable]:
 
         return read_cables(cables)
     return () if cables is None else cables
+
+
+def require_own(arm: Manipulator, pose: Posture) -> None:
+    """Raise InvalidInput if a posture is of another arm."""
+    if instance("pose", pose, Posture).arm is not arm and pose.arm != arm:
+        raise InvalidInput("pose", "is of another arm; take arm.at(q).")

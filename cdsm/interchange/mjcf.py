@@ -27,7 +27,7 @@ from cdsm.errors import InvalidInput, listed, warn
 from cdsm.interchange.mjcf_bodies import LEAST_INERTIA, add_bodies, add_loads, couple
 from cdsm.interchange.mjcf_cables import add_path, pulley_remarks, row, side_sites
 from cdsm.load_texts import texts
-from cdsm.manipulator import Manipulator
+from cdsm.manipulator import Manipulator, require_own
 from cdsm.motors import YIELDING_REMEDY, refuse_yielding
 from cdsm.posture import Posture
 from cdsm.report.checks import balance_error
@@ -172,8 +172,8 @@ def mujoco_model(
     refuse_yielding(arm.motors, "arm", why, YIELDING_REMEDY)
     if (pose is None) != (tension is None):
         raise InvalidInput("tension", "give pose and tension, or neither.")
-    if pose is not None and instance("pose", pose, Posture).arm != arm:
-        raise InvalidInput("pose", "is of another arm; take arm.at(q).")
+    if pose is not None:
+        require_own(arm, pose)
     K = None if pose is None or tension is None else stiffness(pose, tension)
     actuators = ("none" if K is None else "length") if actuators is None else actuators
     one_of("kind of actuators", actuators, _CONTROLS)

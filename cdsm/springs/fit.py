@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, warn
-from cdsm.springs.law import SpringLaw, checked_scale
+from cdsm.springs.law import SpringLaw, checked_points, checked_scale
 from cdsm.support.format import plural, span
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.tables import ANGLE, Columns
-from cdsm.support.validation import doubts_about_angle, interval, number_array
+from cdsm.support.validation import doubts_about_angle, interval
 from cdsm.support.values import Array, Plotted, frozen
 
 SCALE: Final = math.radians(2.0)
@@ -141,11 +141,8 @@ def fit_spring(
         >>> cdsm.fit_spring(x, M)
         <SpringFit exponent 0.7396>
     """
-    x = number_array("angles", angles)
-    y = number_array("torques", torques)
+    x, y = checked_points(angles, torques)
     a = checked_scale(scale)
-    if x.ndim != 1 or x.shape != y.shape:
-        raise InvalidInput("torques", f"shapes {x.shape} and {y.shape} given; a point has both.")
     low, high = interval("between", between, "rad")
     for doubt in doubts_about_angle("an angle of a spring is", float(abs(x).max(initial=0)), _TURN):
         warn(doubt)

@@ -115,12 +115,7 @@ class SpringLaw:
             >>> law.torque([-0.2, 0.0, 0.3, 0.4]).round(4).tolist()
             [-0.08, 0.0, 0.1028, 0.12]
         """
-        x = number_array("angles", angles)
-        y = number_array("torques", torques)
-        if x.ndim != 1 or x.shape != y.shape:
-            raise InvalidInput(
-                "torques", f"shapes {x.shape} and {y.shape} given; a point has both."
-            )
+        x, y = checked_points(angles, torques)
         beside = np.flatnonzero(x)
         if beside.size < 2:
             problem = f"{beside.size} points beside rest given; two or more are needed."
@@ -239,6 +234,15 @@ class SpringLaw:
 _NAMES: Final[dict[type, str]] = {Power: "power", TorqueTable: "table", Given: "function"}
 _NEAR = 1e-3  # an angle [rad] near rest, whose torque the torque at rest is compared with
 _AT_REST = 1e-9
+
+
+def checked_points(angles: ArrayLike, torques: ArrayLike) -> tuple[Array, Array]:
+    """Return the angles (n,) [rad] and the torques (n,) [N m] of points of a spring."""
+    x = number_array("angles", angles)
+    y = number_array("torques", torques)
+    if x.ndim != 1 or x.shape != y.shape:
+        raise InvalidInput("torques", f"shapes {x.shape} and {y.shape} given; a point has both.")
+    return x, y
 
 
 def checked_scale(scale: object) -> float:

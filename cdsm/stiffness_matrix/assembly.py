@@ -12,7 +12,7 @@ from cdsm.loads import LoadsLike, loads_of
 from cdsm.manipulator import ANOTHER_ARM
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix.value import Stiffness
-from cdsm.support.validation import NO_WRENCH, instance, vector
+from cdsm.support.validation import NO_WRENCH, instance
 from cdsm.support.values import Array, frozen, total
 from cdsm.tension import Tension
 from cdsm.terms import ConstantPull, Stretch
@@ -53,8 +53,7 @@ def checked_tension(
     """Check the arguments of :func:`stiffness`; return tensions F (C,) [N], and what acts."""
     arm = instance("pose", pose, Posture).arm
     if not isinstance(tension, Tension):
-        F = vector("tension", tension, len(arm.cables), "one tension [N] per cable", "tension")
-        arm.cables.require_pulling("tension", F)
+        F = arm.cables.tension_vector(tension)
         return F, loads_of(arm, NO_WRENCH if wrench is None else wrench)
     if tension.posture is not pose:
         if not np.array_equal(tension.posture.q, pose.q):

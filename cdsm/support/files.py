@@ -44,7 +44,7 @@ def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> st
             raise FileError(path, "is a binary file; a text file is needed.")
         return data.decode("utf-8-sig")  # with or without a byte-order mark
     except FileNotFoundError:
-        raise FileError(path, f"does not exist (looked in {Path.cwd()}).") from None
+        raise missing_file(path) from None
     except UnicodeDecodeError as error:
         if any_encoding:
             return data.decode("cp1252", errors="replace")
@@ -118,6 +118,11 @@ def as_path(path: str | os.PathLike[str]) -> Path:
         return Path(path)
     except TypeError:
         raise InvalidInput("path", f"{path!r:.100} given; the path of a file is needed.") from None
+
+
+def missing_file(path: str | os.PathLike[str]) -> FileError:
+    """Return the error that a file does not exist."""
+    return FileError(path, f"does not exist (looked in {Path.cwd()}).")
 
 
 def _failure(path: Path, done: str, error: Exception) -> CdsmError:

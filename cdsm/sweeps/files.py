@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cdsm.errors import CdsmError, FileError, need
 from cdsm.quantities import names_of
-from cdsm.support.files import as_path
+from cdsm.support.files import as_path, missing_file
 from cdsm.support.result import write_labelled
 from cdsm.support.status import check_sweep, tidy
 
@@ -69,7 +69,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
     import xarray
 
     if not path.exists():
-        raise FileError(path, f"does not exist (looked in {Path.cwd()}).")
+        raise missing_file(path)
     try:
         if path.is_dir():
             dataset = xarray.open_dataset(path, engine="zarr", consolidated=False)
