@@ -12,6 +12,7 @@ from cdsm.sweeps.infeasible import InfeasiblePostures, explain_infeasible
 from cdsm.sweeps.poses import joint_angles
 from tests.cli.test_commands import call, told
 from tests.support.arms import readme_geometry
+from tests.support.printed import numbers, require_all
 
 SNAKE = Path(__file__).parents[1] / "data" / "snake.toml"
 NO_LOAD = np.zeros(6)
@@ -36,6 +37,17 @@ def test_every_statement_about_a_bent_snake_is_true() -> None:
     assert found.limit is not None
     assert f"try joint_limit = {found.limit:g}" in str(found)
     assert all(name in str(found) for name in [*found.joints][:4])
+    text = str(found)
+    lacking = numbers(text, "{} of {} postures have no tensions within the bounds")
+    require_all(zip(lacking, (found.count, 400), strict=True))
+    wider = numbers(text, "{} of {} have tensions within wider bounds")
+    require_all(zip(wider, (found.widened, found.examined), strict=True))
+    within = numbers(text, "within {} of every joint, {} of {} random postures have tensions")
+    require_all(zip(within, (found.limit, found.share, 256), strict=True), digits=3)
+    for joint, largest in zip(arm.joint_names, found.largest, strict=True):
+        if f"{joint} beyond " in text:
+            require_all([(numbers(text, f"{joint} beyond {{}}")[0], largest)])
+    assert "no posture has tensions with " in text
     limit = {"universal": {"joint_limit": found.limit}}
     bent = cdsm.Manipulator.read(SNAKE, changes={"sections": {"1": limit, "2": limit}})
     assert reasons(bent, 1024)[1].ok.mean() >= 0.94
