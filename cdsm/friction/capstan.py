@@ -23,6 +23,7 @@ from cdsm.wires.elasticity import Elasticity
 _STEPS = 60  # most Newton steps: linear laws need one, strands 3 to 6
 _UNDAMPED = 20  # full Newton steps; later ones are shortened, since full ones may cycle at a kink
 _SLACK = 1e-6  # tension [N] that stands for zero in a shortened step
+_HELD = 1e12  # largest ratio of two tensions at a hole in which the cable is held
 _CONVERGED = 1e-9  # relative change that ends the iteration; the error is about its square
 
 
@@ -74,37 +75,60 @@ class ChainProblem:
                 self._softness[segments] = 1.0 / law.constant_rigidity
 
     def settle(
-        self, length: Array, rest_length: Array, ratio: Array, forced: Array, near: Array
+        self,
+        length: Array,
+        rest_length: Array,
+        ratio: Array,
+        forced: Array,
+        near: Array,
+        ways: NDArray[np.int8] | None = None,
     ) -> ChainState:
         """Compute the tensions and slips of all segments when their lengths become ``length``.
 
         ``length`` (S,) [m] are the new lengths, ``rest_length`` (S,) [m] those before wire slips.
         ``ratio`` (S,) is exp(μ φ) of the hole to the next segment. ``forced`` (C,) [N] is the
         tension of force-controlled motors, NaN for others. The search starts at ``near`` (S,) [N].
+
+        ``ways`` (S,) says in which holes the cables slide, whatever friction demands: 1 towards the
+        end of the cable, where T_{j+1} = ρ_j T_j, −1 towards its motor, 0 in none.
         """
         from cdsm.friction.capstan_kernels import Wire, solve_chains  # imports numba
 
+        growth = np.ones(length.size)  # of T along cables that slide; over it they are even
+        if ways is not None:
+            growth, ratio = self._growth(ratio, ways)
         T = near
         for step in range(_STEPS):
             base, softness = self._strain(T)
-            parts = length, rest_length, base, softness, self._spring, self._unloaded, ratio
-            new, slip, slides = solve_chains(self._start, forced, Wire(*parts), T)
+            parts = length, rest_length, base, softness * growth, self._spring, self._unloaded
+            wire = Wire(*parts, ratio)
+            even, slip, slides = solve_chains(self._start, forced, wire, T / growth)
+            new = even * growth
             if not self._curved or (abs(new - T) <= _CONVERGED * np.maximum(new, 1.0)).all():
                 break
             T = new if step < _UNDAMPED else self._shortened(T, new, length, rest_length)
         stretch = base + softness * new
-        wire = (length - self._spring * (new - self._unloaded)) / stretch
+        taken = (length - self._spring * (new - self._unloaded)) / stretch
         after = rest_length - slip
         after[1:] += slip[:-1]
         first = self._start[:-1]
         supplied = ~np.isnan(forced)
-        after[first[supplied]] = wire[first[supplied]]
+        after[first[supplied]] = taken[first[supplied]]
         slack = (new == 0.0) & ~supplied[self._cable]
         if slack.any():  # the wire of a slack cable moves freely: it spreads evenly over segments
-            surplus = np.add.reduceat(after, first) / np.add.reduceat(wire, first)
-            after = np.where(slack, wire * surplus[self._cable], after)
-        compliance = (self._spring + wire * softness) / stretch
+            surplus = np.add.reduceat(after, first) / np.add.reduceat(taken, first)
+            after = np.where(slack, taken * surplus[self._cable], after)
+        compliance = (self._spring + taken * softness) / stretch
         return ChainState(new, after, slip, slides, stretch, compliance)
+
+    def _growth(self, ratio: Array, ways: NDArray[np.int8]) -> tuple[Array, Array]:
+        """Return T (S,) over that of the first segment, and ratios (S,) of holes, slid or held."""
+        steps = np.append(0.0, (ways * np.log(ratio))[:-1])
+        steps[self._start[:-1]] = 0.0
+        total = np.cumsum(steps)
+        total -= total[self._start[:-1]][self._cable]
+        held = (ways == 0) & (ratio > 1.0)
+        return np.exp(total), np.where(held, _HELD, 1.0)
 
     def rest_lengths(self, length: Array, tension: Array) -> Array:
         """Compute the rest lengths (S,) [m] from lengths (S,) [m] and tensions (S,) [N]."""

@@ -76,9 +76,7 @@ class Equilibrium(Result, Loaded):
         motors: ``"locked"``: they hold the lengths, so the elasticity of the cables counts in
             `K_θ`; ``"tension"``: they hold the tensions (:func:`~cdsm.forward_statics`).
         branch: Share of load and pull up to which the arm followed without a jump; 1: all of it.
-        events: What happened on the way there, in the order of the loads: cables that go slack or
-            pass their maximum, joints that reach their stops, a loss of stability. Empty if load
-            and pull acted at once.
+        smooth_events: Events before cables stick and slide in holes; see :attr:`events`.
         path: How an arm with friction in its holes came there: with friction, where it rests
             depends on it. None: without friction, or motors were locked there.
         commands: What the motors were told since their assembly (M,), in the order of
@@ -97,10 +95,22 @@ class Equilibrium(Result, Loaded):
     model: LockedArm
     motors: Literal["locked", "tension"] = field(default="locked", metadata=unit("1"))
     branch: float = field(default=1.0, metadata=unit("1"))
-    events: tuple[Event, ...] = field(default=(), metadata=unit("1"))
+    smooth_events: tuple[Event, ...] = ()
     path: LoadHistory | None = None
     commands: Array | None = None
     history: str = field(default="", metadata=unit("1"))
+
+    @quantity("1")
+    def events(self) -> tuple[Event, ...]:
+        """What happened on the way there, in its order; with friction, located when asked for.
+
+        Cables that go slack, pass their maximum or leave their law, joints that reach their stops,
+        pulleys that a cable leaves or touches, a loss of stability. Empty if load and pull acted at
+        once. With friction each lies on the ``part`` ``"pull"`` or ``"load"``; while motors pull,
+        cables slide in most holes, which is no event; under the load, the first slip of each hole
+        in which the cable did not slide already is one.
+        """
+        return self.smooth_events + (() if self.path is None else self.path.events)
 
     @property
     def pose(self) -> Posture:
@@ -206,7 +216,11 @@ class Equilibrium(Result, Loaded):
             sentence = f"JUMPED: {share}; from there the arm moves to this other one"
             yield Finding(Status.MOVED, sentence, "JUMPED")
         elif self.jumped:
-            sentence = "SNAPPED: on the way here the arm snapped through"
+            assert self.path is not None
+            steps = zip(self.path.way.parts, self.path.snaps, strict=True)
+            parts = [part for part, snapped in steps if part is not None and snapped]
+            where = f", on the {listed(parts)}" if parts else ""
+            sentence = f"SNAPPED: on the way here the arm snapped through{where}"
             yield Finding(Status.MOVED, sentence, "SNAPPED")
         if not self.stable:
             yield Finding(Status.NEUTRAL, "NEUTRAL: not every joint is brought back")
@@ -498,6 +512,6 @@ def as_equilibrium(
         model=arm,
         motors="tension" if arm.tension_held or not position.any() else "locked",
         branch=branch,
-        events=events,
+        smooth_events=events,
         history=FRICTIONLESS if arm.reference.arm.has_friction else "",
     )

@@ -15,6 +15,9 @@ Kind = Literal[
     "slip", "slack", "stop", "maximum", "law", "lift-off", "groove", "contact", "buckling"
 ]
 
+Part = Literal["pull", "load"]
+"""Part of the way of :func:`~cdsm.forward_statics` with friction: motors pull, then it bears."""
+
 _WORDS: Final[dict[Kind, str]] = {
     "slip": "{} begins to slide",
     "slack": "{} goes slack",
@@ -48,10 +51,13 @@ class Event:
             a step; ``"buckling"``: `K_θ` is no longer positive definite.
         place: Name of the cable, hole or joint; for buckling, of the joint that moves most; for a
             pulley, of its cable and its link.
-        share: Share of the load (and pull) [-]; in a load cycle, of the step to a load.
+        share: Share of the load (and pull) [-]; in a load cycle, of the step to a load; with a
+            ``part``, of that part alone.
         load: Magnitude of the growing force [N]; 0 if no force grows. In a load cycle, of the sum
             of all forces.
         step: In a load cycle, the number of the load at which the step ends.
+        part: Where the arm of forward statics has friction: whether the event lies on the
+            ``"pull"`` of the motors, or on the ``"load"`` after it. None elsewhere.
     """
 
     kind: Kind
@@ -59,6 +65,7 @@ class Event:
     share: float
     load: float
     step: int | None = None
+    part: Part | None = None
 
     def __str__(self) -> str:
         return f"{_WORDS[self.kind].format(self.place)} {self.where}"
@@ -66,7 +73,10 @@ class Event:
     @property
     def where(self) -> str:
         """The load in words, such as ``at 4.5 N``; in a load cycle with the step."""
-        where = f"at {self.load:.4g} N" if self.load else f"at {100.0 * self.share:.4g} % of it"
+        amount = f"at {self.load:.4g} N" if self.load else f"at {100.0 * self.share:.4g} %"
+        if self.part is not None:
+            return f"{amount} of the {self.part}" if self.share else f"as the {self.part} begins"
+        where = amount if self.load else f"{amount} of it"
         where = where if self.share else "at once"
         return where + ("" if self.step is None else f" in the step to load {self.step}")
 
@@ -82,8 +92,9 @@ class Event:
         """Return it for JSON: the load in N."""
         entries = asdict(self)
         entries["load_N"] = entries.pop("load")
-        if self.step is None:
-            del entries["step"]
+        for name in ("step", "part"):
+            if entries[name] is None:
+                del entries[name]
         return entries
 
 

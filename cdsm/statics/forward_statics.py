@@ -70,6 +70,10 @@ def forward_statics(
     motors pull in proportion from nearly nothing, where the arm rests under its weight; then the
     wrench is hung on (:func:`~cdsm.load_cycle`). ``path`` of the result has both states, and
     ``history`` says it in words; its stiffness is the tangent while cables go on sliding.
+    ``events`` says what happens on the pull, and under the load: cables that go slack or pass their
+    maximum, stops, a loss of stability. While motors pull, cables slide in most holes, which is no
+    event; under the load, the first slip of each hole in which the cable did not slide already is
+    one. On the pull they are roots within its eight steps; what begins and ends in one is not seen.
 
     Args:
         arm: The arm.
@@ -193,7 +197,10 @@ def _with_friction(model: Model, home: Posture, wrench: Applied, before: str) ->
     loaded = model(1.0)
     begin = _first_share(loaded)
     slack = settled(pulled(0.0), home)
-    stage = follow(pulled, stage_at(pulled, slack.state.pose, slack.stop_torque, 0.0), begin)[-1]
+    start = stage_at(pulled, slack.state.pose, slack.stop_torque, 0.0)
+    branch = follow(pulled, start, begin)
+    events = events_on(pulled, branch, watched(start.arm), 0.0, begin)
+    stage = branch[-1]
     point = stage.point if stage.share == begin else settled(pulled(begin), stage.pose)
     F = frozen(point.state.tension)
     pose = with_forced(point.state.pose, np.full(F.size, loaded.tension_held))
@@ -204,10 +211,10 @@ def _with_friction(model: Model, home: Posture, wrench: Applied, before: str) ->
         taken = wire - loaded.rest_length
         straight = pose.arm.laws.original_lengths(pose.cable_lengths, F)
         more = np.where(F == 0.0, np.maximum(wire - straight, 0.0), 0.0)
-    goals = [Approach(none, taken, _PULL_STEPS, "the pull")]
-    goals += [Approach(wrench, taken, _LOAD_STEPS, "the load")] if acts(wrench) else []
+    goals = [Approach(none, taken, _PULL_STEPS, "the pull", "pull")]
+    goals += [Approach(wrench, taken, _LOAD_STEPS, "the load", "load")] if acts(wrench) else []
     arm = QuasiStaticArm(pose, F)
-    path, _ = approach(arm, arm.initial(none, more), goals)
+    path, _ = approach(arm, arm.initial(none, more), goals, begin=begin)
     rest = home.arm.at(path.angles[-1], check_limits=False)
     K = path.stiffness(-1)
     k = frozen(np.where(K.tension > 0.0, K.cable_stiffness, 0.0))
@@ -223,6 +230,7 @@ def _with_friction(model: Model, home: Posture, wrench: Applied, before: str) ->
         stop_torque=frozen(path.stop_torque[-1].copy()),
         model=loaded,
         motors="tension" if loaded.tension_held else "locked",
+        smooth_events=tuple(replace(event, part="pull") for event in events),
         path=path,
         history=history,
     )

@@ -19,7 +19,7 @@ from cdsm.loads import LoadsLike, has_loads, loads_of
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
-from cdsm.statics.events import Event, events_text
+from cdsm.statics.events import Event, Part, events_text
 from cdsm.statics.hung_loads import HungLoad, hung_loads, total_force
 from cdsm.statics.quasi_static import (
     NO_PATH,
@@ -444,6 +444,7 @@ class Approach(NamedTuple):
     motors: Array  # commands (C,), as those of a LoadHistory
     substeps: int  # number of equal steps on the way
     what: str  # name of the way, in errors
+    part: Part | None = None  # of forward statics
 
 
 def approach(
@@ -451,10 +452,12 @@ def approach(
     start: QuasiStaticState,
     goals: Sequence[Approach],
     near: Sequence[EquilibriumPath] = (),
+    begin: float = 0.0,
 ) -> tuple[LoadHistory, tuple[EquilibriumPath, ...]]:
     """Load an arm slowly from one goal to the next, from a state at its reference.
 
-    ``near`` is as in :func:`follow_loads`.
+    ``near`` is as in :func:`follow_loads`. ``begin`` is the share of the way to the first goal that
+    ``start`` has behind it.
     """
     pose = arm.reference
     none = np.zeros(pose.q.size)
@@ -489,7 +492,15 @@ def approach(
         stop_torque=frozen(np.array([state.stop_torque for state in states])),
         dissipated=frozen(np.array([step.dissipated for step in steps])),
         snaps=frozen(np.array([step.snapped for step in steps])),
-        way=Way(arm, start, loads, tuple(goal.substeps for goal in goals), paths),
+        way=Way(
+            arm,
+            start,
+            loads,
+            tuple(goal.substeps for goal in goals),
+            paths,
+            tuple(goal.part for goal in goals),
+            begin,
+        ),
     )
     return history, paths
 

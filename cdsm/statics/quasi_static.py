@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cdsm.applied import Applied, between, without_cables
 from cdsm.friction.capstan import ChainProblem, ChainState, chain_tangent
@@ -99,6 +100,7 @@ class QuasiStaticArm:
         self.start = reference.segments.chains.start
         self.forced = ~arm.cables.position_controlled
         self._problem = ChainProblem(arm.cables, self.start)
+        self._rough = arm.has_friction
         refuse_rough(arm.motors, arm.has_friction, "friction")
         self._soft = arm.motors.yielding
         self._torque = None if self._soft is None else self._soft.matrix.T @ tension
@@ -181,8 +183,13 @@ class QuasiStaticArm:
         self._require_domains(state.arm_state.tension, what)
         return state, Step(slip, dissipated, snapped, path)
 
-    def balance(self, before: QuasiStaticState, load: Action) -> Balance:
-        """Return the normal map of the states that follow ``before`` under a load."""
+    def balance(
+        self, before: QuasiStaticState, load: Action, ways: NDArray[np.int8] | None = None
+    ) -> Balance:
+        """Return the normal map of the states that follow ``before`` under a load.
+
+        ``ways`` (S,) prescribes in which holes cables slide, as in :meth:`ChainProblem.settle`.
+        """
         old = before.arm_state
         rest_length = before.arm_state.chain.rest_length.copy()
         rest_length[self.start[:-1]] -= ~self.forced * (load.motors - before.load.motors)
@@ -190,11 +197,19 @@ class QuasiStaticArm:
         def at(q: Array) -> ChainArmState:
             pose = self.reference.arm.at(q, check_limits=False)
             near = np.maximum(old.tension + old.slope @ (q - old.pose.q), 0.0)
-            return self._state(pose, rest_length, load, near)
+            return self._state(pose, rest_length, load, near, ways)
 
-        return Balance(at, self.reference, old, load.holding)
+        walls = self._rough and ways is None
+        return Balance(at, self.reference, old, load.holding, has_walls=walls)
 
-    def _state(self, pose: Posture, rest_length: Array, load: Action, near: Array) -> ChainArmState:
+    def _state(
+        self,
+        pose: Posture,
+        rest_length: Array,
+        load: Action,
+        near: Array,
+        ways: NDArray[np.int8] | None = None,
+    ) -> ChainArmState:
         """Compute the state at a posture; the search for tensions starts at ``near`` (S,) [N]."""
         segments = pose.segments
         terms = without_cables(pose, load.wrench)
@@ -204,7 +219,7 @@ class QuasiStaticArm:
         lengths = segments.lengths
         if self._soft is not None:
             lengths = self._pulled(lengths, rest_length, forced, near)
-        chain = self._problem.settle(lengths, rest_length, segments.ratio, forced, near)
+        chain = self._problem.settle(lengths, rest_length, segments.ratio, forced, near, ways)
         turning = np.zeros_like(J)
         T = chain.tension
         turning[chains.hole] = chains.friction[:, None] * segments.wrap_jacobian

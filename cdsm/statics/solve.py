@@ -67,6 +67,7 @@ class Balance:
     """Normal map f(x) of the model ``at(q)``, with the torque ``holding`` subtracted from r.
 
     The stops are those of an arm that was locked at ``reference``; ``near`` is a state close by.
+    ``has_walls`` says that r rises steeply within short ways, where cables stick.
     """
 
     def __init__(
@@ -75,8 +76,11 @@ class Balance:
         reference: Posture,
         near: ArmState,
         holding: Array | float = 0.0,
+        *,
+        has_walls: bool = False,
     ) -> None:
         arm = reference.arm
+        self.has_walls = has_walls
         self.reference = reference
         self._at = at
         self._holding = holding
@@ -145,15 +149,18 @@ def settle(f: Balance, q: Array, reached: float = 0.0, load: str = "the load") -
     return here
 
 
-def continued(f: Balance, guesses: Iterable[Array], before: Array) -> Point | None:
+def continued(
+    f: Balance, guesses: Iterable[Array], before: Array, steps: int = _STEPS
+) -> Point | None:
     """Find the stable equilibrium near the angles ``before`` (nv,), as a load changes a little.
 
     The searches begin at the points ``guesses``. Returns None if none finds one to which no joint
-    moves by more than 0.1 rad.
+    moves by more than 0.1 rad, in so many ``steps``.
     """
     for x in guesses:
         point = f.attempt(x)
-        here, is_stable = _descend(f, point, 0.0, before / f.unit) if point else (None, False)
+        home = before / f.unit
+        here, is_stable = _descend(f, point, 0.0, home, steps) if point else (None, False)
         if is_stable:
             return here
     return None
@@ -182,7 +189,7 @@ def least_eigenvalue(f: Balance, point: Point) -> float:
 
 
 def _descend(
-    f: Balance, here: Point, shift: float, home: Array | None = None
+    f: Balance, here: Point, shift: float, home: Array | None = None, steps: int = _STEPS
 ) -> tuple[Point, bool]:
     """Newton's method on K + ``shift``, which is raised to be positive definite.
 
@@ -191,7 +198,7 @@ def _descend(
     """
     kicks = 0
     identity = np.eye(here.x.size)
-    for _ in range(_STEPS):
+    for _ in range(steps):
         if home is not None and abs(f.inside(here.x) - home).max() > FAR:
             break
         values = np.linalg.eigvalsh(K := _symmetric(f, here))
@@ -213,7 +220,7 @@ def _descend(
         if saddle:
             there = f.attempt(here.x + step)
         else:
-            there, step = _reached(f, here, step, far=home is None)
+            there, step = _reached(f, here, step, far=home is None or f.has_walls)
         gain = float(here.value @ step)
         if there and (saddle or 0.0 > 0.5 * gain > (here.value + there.value) @ step):
             here = there
@@ -229,7 +236,8 @@ def _reached(f: Balance, here: Point, step: Array, *, far: bool) -> tuple[Point 
     Where cables begin to stick or to pull, K grows within the step, and f·step has turned positive
     at its end: the next end is where f·step is 0 if it is linear along the step. If this end is far
     short of it, since K has grown at once, a search that may go ``far`` ends the step between both.
-    Near a branch of equilibria that must not be left, small steps do.
+    Near a branch of equilibria that must not be left, small steps do, unless K has such walls that
+    they would take hundreds.
     """
     there = f.attempt(here.x + step)
     beyond = 0.0  # f·step at a longer step that went too far, per length of this one

@@ -1,0 +1,80 @@
+"""Events within one sub-step of slow loading, also where the arm jumps in it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdsm.statics.contact_events import contact_angles, contact_kind
+from cdsm.statics.crossings import Between, Watched, crossings
+from cdsm.statics.events import Kind, buckling_joint
+from cdsm.statics.quasi_static import (
+    QuasiStaticArm,
+    Substep,
+)
+from cdsm.statics.sliding import continued_sliding
+from cdsm.statics.slow_watch import SlowStage, known_point
+from cdsm.support.values import Array
+
+_HALVINGS = 48  # of a sub-step in which the arm loses its stability
+PRECISION = 1e-12  # of a root, relative to its sub-step: equilibria are no better
+_SINCE: tuple[Kind, ...] = ("slack", "maximum", "law", "stop")  # what a jump may bring about
+
+
+def events_within(
+    arm: QuasiStaticArm, part: Substep, watch: Watched[SlowStage]
+) -> list[tuple[Kind, str, SlowStage]]:
+    """Return the events of a sub-step in their order."""
+
+    def solve(share: float, below: SlowStage, above: SlowStage) -> SlowStage | None:
+        f = arm.balance(part.before, part.before.load.interpolate(part.after.load, share))
+        guesses = [*guesses_between(share, below, above), part.before.x]
+        point = continued_sliding(f, guesses, part.before.arm_state.pose.q)
+        return None if point is None else SlowStage(share, point, f)
+
+    f = arm.balance(part.before, part.before.load)
+    here = SlowStage(0.0, known_point(f, part.before.arm_state, part.before.x), f)
+    f = arm.balance(part.before, part.after.load)
+    there = SlowStage(1.0, known_point(f, part.after.arm_state, part.after.x), f)
+    last = there
+    if part.snapped:
+        last = here
+        low, high = 0.0, 1.0
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2.0
+            stage = solve(middle, last, there)
+            low, high, last = (low, middle, last) if stage is None else (middle, high, stage)
+    between = Between(solve, here, last)
+    roots = sorted(crossings(between, here, last, watch, PRECISION), key=lambda root: root[1])
+    events = [
+        (kind_at(watch, i, between, share), watch.places[i], between.at(share))
+        for i, share in roots
+    ]
+    if part.snapped:
+        K = last.point.state.stiffness
+        joint = buckling_joint(K, last.point.out, arm.reference.arm.joint_names)
+        events.append(("buckling", joint, last))
+        new = (watch.value(last) >= 0.0) & (watch.value(there) < 0.0)
+        events += [
+            (watch.kinds[i], watch.places[i], there._replace(share=last.share))
+            for i in np.flatnonzero(new).tolist()
+            if watch.kinds[i] in _SINCE
+        ]
+    return events
+
+
+def guesses_between(share: float, below: SlowStage, above: SlowStage) -> list[Array]:
+    """Return where the search for an equilibrium begins, between two that are known.
+
+    A step of a cable's length at a pulley lies between them: begin on the near side of it.
+    """
+    part = (share - below.share) / (above.share - below.share)
+    straight = below.point.x + part * (above.point.x - below.point.x)
+    before, after = (contact_angles(stage.point.state.pose) > 0.0 for stage in (below, above))
+    guesses = [straight, below.point.x]
+    return guesses if np.array_equal(before, after) else guesses[::-1]
+
+
+def kind_at(watch: Watched[SlowStage], i: int, between: Between[SlowStage], share: float) -> Kind:
+    """Return the kind of event i, at a share."""
+    before = between.before(share, lambda stage: float(watch.value(stage)[i]))
+    return contact_kind(watch.kinds, i, before.point.state.pose)
