@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,10 +29,6 @@ from cdsm.support.validation import (
 )
 from cdsm.support.values import Array
 from cdsm.tension import Tension
-
-if TYPE_CHECKING:
-    pass
-
 
 _SUBSTEPS = 2  # of load_cycle; fixed, so that predictions are smooth functions of parameters
 
