@@ -9,14 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from cdsm.errors import FileError, InvalidInput
+from cdsm.estimation.result import beyond_noise
 from cdsm.joint_columns import JointColumns
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.tables import NEWTONS, TEXT, Columns
 from cdsm.support.validation import instance
 from cdsm.support.values import Array, frozen
-
-_NOISE = 0.1  # [rad], or of the arm's length: so far beyond a limit, an encoder is not just noisy
 
 
 class LoadCellReading(NamedTuple):
@@ -60,9 +59,7 @@ def read_load_cells(path: str | os.PathLike[str], arm: Manipulator) -> tuple[Loa
     for row, label in zip(table.rows, labels, strict=True):
         try:
             q = joints.angles(table, [row])[0]
-            noise = np.where(arm.slides, _NOISE * arm.length, _NOISE)
-            far = bool(((q < arm.lower - noise) | (q > arm.upper + noise)).any())
-            pose = arm.at(q, check_limits=far)
+            pose = arm.at(q, check_limits=bool(beyond_noise(arm, q).any()))
         except InvalidInput as error:
             raise FileError(path, f"line {row[0]}: {error}") from None
         F = frozen(np.array([table.number(row, name) for name in cables]))

@@ -15,17 +15,25 @@ from cdsm.dead_loads import Load
 from cdsm.errors import listed
 from cdsm.estimation.components import Components
 from cdsm.load_texts import texts
+from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.determination import INTERVAL, Determination, chi_square_text, likely
-from cdsm.support.format import aligned, coordinates, plural, span, with_uncertainty
+from cdsm.support.format import aligned, coordinates, place, plural, span, with_uncertainty
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import SMALLEST
 from cdsm.support.values import Array, Plotted, frozen
 
+_NOISE = 0.1  # [rad], or of the arm's length: so far beyond a limit, an encoder is not just noisy
 _WIDE = 3.0  # times the instruments by which friction is named in a warning
 _LARGE = 0.5  # Σ μ β of a cable from which on first order misleads
 _CORRELATED = 0.9  # correlation of two loads that is printed
 _SHOWN = 0.05  # part of the largest coefficient of a combination below which one is not printed
+
+
+def beyond_noise(arm: Manipulator, q: Array) -> Array:
+    """Return how far angles (nv,) are beyond a limit [rad or m]; 0 where it may be noise."""
+    beyond = np.maximum(arm.lower - q, q - arm.upper)
+    return np.where(beyond > _NOISE * np.where(arm.slides, arm.length, 1.0), beyond, 0.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -84,6 +92,17 @@ class TensionEstimate(Result):
                 f"the readings do not fit: {chi_square_text(self.chi_square, self.freedom)}. "
                 "Another load acts, or the model of the arm is wrong (masses, places of holes, "
                 "springs), or the standard uncertainties are too small."
+            )
+        arm = self.posture.arm
+        beyond = beyond_noise(arm, self.posture.q)
+        if beyond.any():
+            far = [
+                f"{arm.joint_names[i]} by {place(beyond[i], arm.joint_units[i])}"
+                for i in np.flatnonzero(beyond).tolist()
+            ]
+            warnings.append(
+                f"read beyond a limit, farther than encoders are noisy: {listed(far, 6)}; check "
+                "the zeros and units of these encoders, and the joint limits of the arm"
             )
         if self.at_stop:
             their = "their equations are" if len(self.at_stop) > 1 else "its equation is"

@@ -128,3 +128,19 @@ def test_arms_without_geometry_and_with_pulleys() -> None:
     found = cdsm.estimate_load(pose, np.full(9, 20.0), tension_std=0.1)
     assert found.names == ("fx at l3", "fy at l3", "fz at l3")
     assert "no friction" in str(found)
+
+
+def test_a_joint_far_beyond_its_limit_is_doubted() -> None:
+    arm = POSE.arm
+    q = POSE.q.copy()
+    q[0] = arm.upper[0] + 0.2
+    for found in (
+        cdsm.estimate_tensions(arm.at(q, check_limits=False), F, tension_std=0.5),
+        cdsm.estimate_load(arm.at(q, check_limits=False), F, {"tool0": "force"}, tension_std=0.5),
+    ):
+        told = next(text for text in found.warnings if text.startswith("read beyond a limit"))
+        assert f"{arm.joint_names[0]} by 11.46°" in told
+        assert told in " ".join(str(found).split())
+    q[0] = arm.upper[0] + 0.05  # an encoder's noise
+    near = cdsm.estimate_tensions(arm.at(q, check_limits=False), F, tension_std=0.5)
+    assert not any("beyond" in text for text in near.warnings)
