@@ -16,6 +16,7 @@ from cdsm.design.goals import Constraint, Objective
 from cdsm.design.problem import DesignProblem
 from cdsm.design.variables import Variable
 from cdsm.errors import LINES, CdsmError, FileError, GeometryError, InvalidInput, listed
+from cdsm.loads import has_loads
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import read_text
 from cdsm.support.format import plural
@@ -155,6 +156,8 @@ def _check_angles(angles: Any, joints: Sequence[str]) -> None:
 def _loads(loads: Any) -> Any:
     if loads is None:
         return np.zeros((1, 6))
+    if loads and has_loads(loads):  # which the problem refuses
+        return loads
     rows = loads if isinstance(loads, list) and loads and isinstance(loads[0], list) else [loads]
     return [
         [*row, 0.0, 0.0, 0.0] if isinstance(row, list) and len(row) == 3 else row for row in rows

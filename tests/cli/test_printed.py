@@ -218,10 +218,7 @@ def test_weigh_in_cycles_and_their_table(tmp_path: Path) -> None:
         units = ["", "N", "N", "N", "mm", "mm", "mm", "", "mJ"]
         printed = [Printed(*pair) for pair in zip(cells, units, strict=True)]
         require_all(zip(printed, numbers_of_row, strict=True), digits=None)
-        *numbers_of_table, happened = reading
-        np.testing.assert_allclose([float(x) for x in numbers_of_table], numbers_of_row)
-        at_step = [event["place"] for event in answer["events"] if event["step"] == k]
-        assert [words.partition(" begins")[0] for words in happened.split("; ")] == at_step
+        np.testing.assert_allclose([float(x) for x in reading], numbers_of_row)
     require_all([(numbers(text, "in all {} lost")[0], sum(answer["dissipated_J"]))])
     first, second = np.split(np.array(answer["dissipated_J"]), 2)
     assert answer["lost_in_last_cycle_J"] == pytest.approx(second.sum())

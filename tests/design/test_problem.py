@@ -275,6 +275,17 @@ def test_margins_of_an_older_problem_are_refused_with_what_to_do(key: str, tmp_p
 # --- files for the workshop ---------------------------------------------------------------
 
 
+@pytest.mark.parametrize("loads", ["[{ link2 = [0, 0, -1] }]", "{ link2 = [0, 0, -1] }"])
+def test_loads_on_links_in_a_file_are_refused_with_what_to_do(loads: str, tmp_path: Path) -> None:
+    text = (EXAMPLES / "design.toml").read_text(encoding="utf-8")
+    text = text.replace('arm = "arm.toml"', f"arm = '{EXAMPLES / 'arm.toml'}'")
+    file = tmp_path / "design.toml"
+    file.write_text(text.replace("loads = [[0.0, 0.0, -4.905]]", f"loads = {loads}"), "utf-8")
+    said = r"loads: designs take wrenches .* the arm: with_loads, \[\[loads\]\] in its ARM.toml"
+    with pytest.raises(cdsm.FileError, match=said):
+        cdsm.DesignProblem.read(file)
+
+
 def test_files_for_the_workshop(tmp_path: Path) -> None:
     found = cdsm.search_designs(problem(), generations=1, population=4)
     arm = found.arm()
