@@ -23,6 +23,9 @@ def stiffness(
 ) -> Stiffness:
     """Compute the joint stiffness with its terms (Eq. 16), and the Cartesian stiffness.
 
+    `K_θ = H_L·F + J_Lᵀ K_L J_L + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ` [N m/rad], and the stiffness of springs, if
+    there are any: the derivative of the joint torque, motors and load held.
+
     Args:
         pose: The posture.
         tension: The result of :func:`~cdsm.distribute_tension` at this posture, or your own
