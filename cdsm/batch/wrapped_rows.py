@@ -39,7 +39,7 @@ from cdsm.support.values import Array
 Solve = Callable[[Rows, int], tuple[dict[str, Array], Codes]]
 
 PLAIN = 2000
-"""Rows up to which the kernels of contacts run by numpy: to compile them takes seconds once."""
+"""Rows up to which kernels of contacts run by numpy: to compile them takes 20 s, once."""
 
 _ROWS = 8192  # whose contacts are computed at a time
 _WIDTH = 64  # postures side by side
