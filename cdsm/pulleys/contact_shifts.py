@@ -30,6 +30,7 @@ a cable that is about to lift off (s = 0) is an ordinary case.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Self
@@ -283,7 +284,7 @@ class Shifts:
         M[:, held, held] = 1.0
         sides = (-length[:, None] * kink).reshape(2, postures, T, -1)
         given = sides.transpose(1, 0, 2, 3).reshape(postures, 2 * T, -1)
-        shifts = np.asarray(np.linalg.solve(M, given), np.float64)
+        shifts = _solved(M, given)
         return tuple(side.reshape(postures * T, -1) for side in np.split(shifts, 2, axis=1))  # type: ignore[return-value]
 
     @cached_property
@@ -408,3 +409,18 @@ def _of_each(columns: Array, postures: int) -> Array:
 def _form(a: Array, matrix: Array, b: Array) -> Array:
     """Compute aᵀ M b (T,) for vectors (3, T) and matrices (T, 3, 3)."""
     return np.asarray(np.einsum("xt,txy,yt->t", a, matrix, b))
+
+
+def _solved(matrix: Array, given: Array) -> Array:
+    """Solve M x = given of each posture; NaN where M is singular.
+
+    It is never singular where all contacts exist; batches also compute rows that they refuse.
+    """
+    try:
+        return np.asarray(np.linalg.solve(matrix, given), np.float64)
+    except np.linalg.LinAlgError:
+        found = np.full(given.shape, np.nan)
+        for row, (M, right) in enumerate(zip(matrix, given, strict=True)):
+            with suppress(np.linalg.LinAlgError):
+                found[row] = np.linalg.solve(M, right)
+        return found

@@ -9,6 +9,7 @@ import pytest
 
 import cdsm
 from cdsm.batch import solution
+from cdsm.pulleys.contact_shifts import _solved
 from tests.support.pulleys import finger
 
 OUTPUTS = ("joint", "active", "passive", "cable_lengths", "length_jacobian", "along", "tip")
@@ -109,3 +110,12 @@ def test_the_report_compares_with_a_batch() -> None:
     report = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=5.0)).report()
     assert "not possible" not in str(report)
     assert "FAIL" not in str(report)
+
+
+def test_shifts_that_do_not_exist_in_a_row_are_no_obstacle_to_others() -> None:
+    """In a row that is refused, contacts may be anything; numpy had raised LinAlgError for all."""
+    M = np.stack([2.0 * np.eye(2), np.zeros((2, 2)), np.eye(2)])
+    found = _solved(M, np.ones((3, 2, 4)))
+    np.testing.assert_array_equal(found[0], 0.5)
+    assert np.isnan(found[1]).all()
+    np.testing.assert_array_equal(found[2], 1.0)
