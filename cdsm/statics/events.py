@@ -29,6 +29,9 @@ _WORDS: Final[dict[Kind, str]] = {
     "contact": "{} touches",
     "buckling": "the arm buckles, {} most",
 }
+LIMIT_POINT: Final = "limit point"
+"""Cause of a snap: an eigenvalue of K_θ is 0, and the load has its largest value."""
+
 _AT_PULLEYS: Final[dict[Kind, str]] = {
     "lift-off": "lifts off",
     "groove": "leaves its groove",
@@ -58,6 +61,8 @@ class Event:
         step: In a load cycle, the number of the load at which the step ends.
         part: Where the arm of forward statics has friction: whether the event lies on the
             ``"pull"`` of the motors, or on the ``"load"`` after it. None elsewhere.
+        cause: Of buckling in a load cycle: ``"limit point"``, where an eigenvalue of K_θ is 0; or
+            what takes so much stiffness that the arm snaps, such as a cable that begins to slide.
     """
 
     kind: Kind
@@ -66,9 +71,14 @@ class Event:
     load: float
     step: int | None = None
     part: Part | None = None
+    cause: str = ""
 
     def __str__(self) -> str:
-        return f"{_WORDS[self.kind].format(self.place)} {self.where}"
+        if self.cause == LIMIT_POINT:
+            return f"{self.label} at a limit point {self.where}"
+        if self.cause:
+            return f"the arm snaps as {self.cause}, {self.place} most, {self.where}"
+        return f"{event_words(self.kind, self.place)} {self.where}"
 
     @property
     def where(self) -> str:
@@ -86,7 +96,7 @@ class Event:
         if self.kind in _AT_PULLEYS:
             cable, _, pulley = self.place.partition(" on the ")
             return f"{cable} {_AT_PULLEYS[self.kind]} ({pulley.partition(' (')[0]})"
-        return _WORDS[self.kind].format(self.place)
+        return event_words(self.kind, self.place)
 
     def to_dict(self) -> dict[str, object]:
         """Return it for JSON: the load in N."""
@@ -95,7 +105,14 @@ class Event:
         for name in ("step", "part"):
             if entries[name] is None:
                 del entries[name]
+        if not self.cause:
+            del entries["cause"]
         return entries
+
+
+def event_words(kind: Kind, place: str) -> str:
+    """Return what happens, and where, in words without the load."""
+    return _WORDS[kind].format(place)
 
 
 def first_slips(events: Sequence[Event]) -> list[Event]:

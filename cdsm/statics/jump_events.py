@@ -7,12 +7,11 @@ import numpy as np
 from cdsm.statics.contact_events import contact_angles, contact_kind
 from cdsm.statics.crossings import Between, Watched, crossings
 from cdsm.statics.events import Kind, buckling_joint
-from cdsm.statics.quasi_static import (
-    QuasiStaticArm,
-    Substep,
-)
+from cdsm.statics.quasi_static import QuasiStaticArm, Substep
 from cdsm.statics.sliding import continued_sliding
+from cdsm.statics.slow_snaps import path_end
 from cdsm.statics.slow_watch import SlowStage, known_point
+from cdsm.statics.solve import Balance
 from cdsm.support.values import Array
 
 _HALVINGS = 48  # of a sub-step in which the arm loses its stability
@@ -22,11 +21,14 @@ _SINCE: tuple[Kind, ...] = ("slack", "maximum", "law", "stop")  # what a jump ma
 
 def events_within(
     arm: QuasiStaticArm, part: Substep, watch: Watched[SlowStage]
-) -> list[tuple[Kind, str, SlowStage]]:
-    """Return the events of a sub-step in their order."""
+) -> list[tuple[Kind, str, SlowStage, str]]:
+    """Return the events of a sub-step in their order; of a snap, with its cause."""
+
+    def balance(share: float) -> Balance:
+        return arm.balance(part.before, part.before.load.interpolate(part.after.load, share))
 
     def solve(share: float, below: SlowStage, above: SlowStage) -> SlowStage | None:
-        f = arm.balance(part.before, part.before.load.interpolate(part.after.load, share))
+        f = balance(share)
         guesses = [*guesses_between(share, below, above), part.before.x]
         point = continued_sliding(f, guesses, part.before.arm_state.pose.q)
         return None if point is None else SlowStage(share, point, f)
@@ -43,19 +45,21 @@ def events_within(
             middle = (low + high) / 2.0
             stage = solve(middle, last, there)
             low, high, last = (low, middle, last) if stage is None else (middle, high, stage)
+    end = path_end(balance, last, watch) if part.snapped else None
     between = Between(solve, here, last)
     roots = sorted(crossings(between, here, last, watch, PRECISION), key=lambda root: root[1])
     events = [
-        (kind_at(watch, i, between, share), watch.places[i], between.at(share))
+        (kind_at(watch, i, between, share), watch.places[i], between.at(share), "")
         for i, share in roots
     ]
-    if part.snapped:
+    if end is not None:
+        last = end.stage
         K = last.point.state.stiffness
         joint = buckling_joint(K, last.point.out, arm.reference.arm.joint_names)
-        events.append(("buckling", joint, last))
+        events.append(("buckling", joint, last, end.cause))
         new = (watch.value(last) >= 0.0) & (watch.value(there) < 0.0)
         events += [
-            (watch.kinds[i], watch.places[i], there._replace(share=last.share))
+            (watch.kinds[i], watch.places[i], there._replace(share=last.share), "")
             for i in np.flatnonzero(new).tolist()
             if watch.kinds[i] in _SINCE
         ]

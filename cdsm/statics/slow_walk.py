@@ -281,7 +281,7 @@ class Walk:
         what = f"the step to load {step}"
         self._arm.step_to(self._state, action(goal), 1, what, seen=parts.append)
         for part in parts:
-            for kind, place, stage in events_within(self._arm, part, self._watch):
+            for kind, place, stage, cause in events_within(self._arm, part, self._watch):
                 share = part.begin + stage.share * (part.end - part.begin)
                 share = begin + share * (goal - begin)
                 self.events.append(
@@ -291,6 +291,7 @@ class Walk:
                         share,
                         float(np.linalg.norm(total_force(action(share).wrench))),
                         step,
+                        cause=cause,
                     )
                 )
                 self.angles.append(stage.point.state.pose.q)
