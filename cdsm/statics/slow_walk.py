@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.statics.crossings import ROUNDING, Between, Watched
-from cdsm.statics.events import Event, Kind
+from cdsm.statics.events import LIMIT_POINT, Event, Kind, event_words
 from cdsm.statics.hung_loads import total_force
 from cdsm.statics.jump_events import PRECISION, events_within, guesses_between, kind_at
 from cdsm.statics.pieces import root
@@ -58,6 +58,7 @@ class Walk:
         self._values = watch.value(self._here)
         self._none = ROUNDING * watch.scale(self._here)
         self._passed = self._values < -self._none  # which quantities are negative
+        self._latest = math.nan, ""  # share and words of the last event of the step
         self._slips = np.array([kind == "slip" for kind in watch.kinds], dtype=np.bool_)
         self._hole = arm.reference.segments.chains.hole  # segment before each hole (P,)
         self._ways = ways_of(start.arm_state)
@@ -69,6 +70,7 @@ class Walk:
         """Go to a load in the sub-steps of its path, and note the events but for slips."""
         begin = self._state.load
         self._here = self._here._replace(share=0.0)
+        self._latest = math.nan, ""
         self._wanted = ~self._slips
         for goal in sorted(near):
             self._go(step, begin, load, goal, math.inf, near)
@@ -80,6 +82,7 @@ class Walk:
         """Go to a load in sub-steps, and note the events; of a hole its first slip if ``once``."""
         begin = self._state.load
         self._here = self._here._replace(share=0.0)
+        self._latest = math.nan, ""
         self._once = once
         self._news = ~(self._slips & self._passed) if once else np.ones_like(self._slips)
         part = 1.0 / substeps
@@ -144,6 +147,7 @@ class Walk:
     ) -> None:
         """Note an event: quantity i has become negative at ``stage``."""
         self._passed[i] = True
+        self._latest = stage.share, event_words(kind, self._watch.places[i])
         if self._slips[i]:
             count = self._hole.size
             self._ways[self._hole[i % count]] = 1 if i < count else -1
@@ -281,9 +285,13 @@ class Walk:
         what = f"the step to load {step}"
         self._arm.step_to(self._state, action(goal), 1, what, seen=parts.append)
         for part in parts:
-            for kind, place, stage, cause in events_within(self._arm, part, self._watch):
+            for kind, place, stage, reason in events_within(self._arm, part, self._watch):
                 share = part.begin + stage.share * (part.end - part.begin)
                 share = begin + share * (goal - begin)
+                cause = reason
+                at_once = abs(share - self._latest[0]) <= PRECISION
+                if kind == "buckling" and cause != LIMIT_POINT and at_once:
+                    cause = self._latest[1]
                 self.events.append(
                     Event(
                         kind,
