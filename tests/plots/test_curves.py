@@ -11,14 +11,8 @@ from matplotlib.figure import Figure
 import cdsm
 from cdsm import plots
 from cdsm.plots.curves import _MARKS
-from cdsm.plots.style import (
-    DARK,
-    TERM_COLORS,
-    VERMILLION,
-    cable_lines,
-    move_apart,
-    round_numbers,
-)
+from cdsm.plots.lines import cable_lines, move_apart
+from cdsm.plots.style import DARK, TERM_COLORS, VERMILLION, round_numbers
 from tests.support.arms import mixed_arm, random_posture
 from tests.support.pictures import (
     artists,
