@@ -465,6 +465,15 @@ def test_identify(tmp_path: Path) -> None:
     _, command, *rest = shlex.split(advice.partition(": ")[2])
     wider = told(command, *rest)
     assert wider["values_own_unit"] == pytest.approx(found["values_own_unit"], rel=1e-3)
+    # of deviations that were guessed too small, the command of the warning explains the rest
+    asked_of = list(asked)
+    asked_of[4] = 0.0008
+    doubted = told(*asked_of, "--free", "rigidity=0.5:2", code=3)
+    assert doubted["chi_square"] > 4.0 * doubted["freedom"]
+    (advice,) = (s for s in doubted["warnings"] if s.startswith("Next, if 0.0008 mm was a guess"))
+    _, command, *rest = shlex.split(advice.partition(": ")[2])
+    likely = told(command, *rest)
+    assert likely["chi_square"] == pytest.approx(likely["freedom"], rel=1e-3)
     # from a friction of 0 in the file, and from another start, it is the same
     again = told(
         *asked, "--free", "rigidity=0.5:2", "--set", "friction=0", "--start", "rigidity=0.7"

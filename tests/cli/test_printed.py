@@ -302,7 +302,7 @@ def test_plan_along_a_path_and_its_table(tmp_path: Path) -> None:
 
 def test_sweep_has_quantiles_of_its_table(tmp_path: Path) -> None:
     out = tmp_path / "s.csv"
-    text, answer = both(f"sweep ARM --grid joint1_1=-50:20:5,joint3_1=-15:15:4 --out {out}")
+    text, answer = both(f"sweep ARM --grid joint1_1=-50:20:10,joint3_1=-15:15:8 --out {out}")
     rows = [*csv.DictReader(out.read_text(encoding="utf-8").splitlines())]
     counted = [row["status"] for row in rows]
     assert answer["entries"] | {word: counted.count(word) for word in counted} == answer["entries"]
@@ -325,6 +325,7 @@ def test_sweep_has_quantiles_of_its_table(tmp_path: Path) -> None:
         levels = {"least": 0.0, "5 %": 0.05, "median": 0.5, "95 %": 0.95, "most": 1.0}
         for mark, level in levels.items():
             exact = np.quantile(values, level, method="inverted_cdf")
+            assert level in (0.0, 0.5, 1.0) or len(values) > 40  # else it is an end
             if math.isfinite(exact):
                 assert marks[mark] == pytest.approx(exact, rel=1e-12)
             require_all([(Printed(cells[mark].text, cells["unit"].text), exact)])

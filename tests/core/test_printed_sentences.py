@@ -65,6 +65,17 @@ def test_the_report_says_what_small_loads_measure_while_cables_stick() -> None:
     require_all(zip(measured, [K.along(u) for u in "xyz"], strict=True))
 
 
+def test_a_weight_says_how_many_holes_slide_under_the_whole_of_it() -> None:
+    rough = POSE.arm.with_friction(0.1).at(POSE.q)
+    test = cdsm.weight_test(rough, cdsm.distribute_tension(rough, 40.0), [0.0, 0.0, -2.0], steps=4)
+    assert test.history is not None
+    counts = np.count_nonzero(test.history.sliding, axis=1)
+    assert counts[0] < counts[-1]
+    size, _, *holes = numbers(str(test), "this weight, {}, measures {}; {} of {} holes slide")
+    require_all([(size, 2.0)])
+    assert [int(each.text) for each in holes] == [counts[-1], len(test.history.holes)]
+
+
 def test_a_remedy_that_is_printed_holds_the_arm_and_less_of_it_does_not() -> None:
     """The printed factor is rounded to the safe side."""
     K = cdsm.stiffness(LOOSE, cdsm.distribute_tension(LOOSE, 100.0))

@@ -99,6 +99,12 @@ def test_saturation_and_buckling_are_marked_where_they_are() -> None:
     assert shade.get_x() == pytest.approx(critical.minimum)
     assert f"buckles from {critical.minimum:.3g} N" in ax.get_title(loc="left")
     require_look(ax)
+    most = 100.0 * critical.minimum  # of bounded tensions the buckling is not sought
+    ax = plots.plot_stiffness_over_tension(cdsm.saturation(soft, "z", maximum=most), levels)
+    assert artists(ax, "unstable")["unstable"].get_x() == pytest.approx(levels[3])
+    for text in (ax.get_title(loc="left"), ax.texts[-1].get_text()):
+        require_all([(numbers(" ".join(text.split()), "holds up to {}")[0], levels[3])], digits=3)
+    require_look(ax)
     ax = critical.plot()
     np.testing.assert_allclose(line(ax, "margin").T, [critical.bounds, critical.margins])
     np.testing.assert_array_equal(line(ax, "event:buckling"), [[critical.minimum, 0.0]])

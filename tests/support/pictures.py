@@ -112,16 +112,35 @@ def require_keys(figure: Figure) -> None:
         assert len({*looks}) == len(said), dict(zip(said, looks, strict=True))
 
 
+def require_ticks(figure: Figure) -> None:
+    """Ticks that have numbers, those of colour bars too, stand at them."""
+    for ax in figure.findobj(Axes):
+        assert isinstance(ax, Axes)
+        if not ax.axison or ax.name != "rectilinear":
+            continue
+        for axis in (ax.xaxis, ax.yaxis):
+            if axis.get_offset_text().get_text():
+                continue
+            low, high = sorted(axis.get_view_interval())
+            for tick in axis.get_major_ticks():
+                at = tick.get_loc()
+                for label in (tick.label1, tick.label2):
+                    said = label.get_text().replace("−", "-")
+                    if low <= at <= high and re.fullmatch(r"-?[\d.]+(e[-+]?\d+)?", said):
+                        assert abs(float(said) - at) <= 1e-3 * max(abs(at), high - low), said
+
+
 def require_look(picture: Any) -> None:
     """Units on both axes, three ticks or more, no text over another or outside the figure.
 
-    Entries of legends are told apart.
+    Entries of legends are told apart, and ticks have the numbers at which they stand.
     """
     figure = figure_of(picture)
     require_keys(figure)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     renderer = canvas.get_renderer()
+    require_ticks(figure)
     for ax in panels(picture):
         if not ax.axison or ax.name != "rectilinear":
             continue
