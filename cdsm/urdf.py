@@ -69,9 +69,10 @@ def to_urdf(geometry: Geometry) -> str:
     return urdf_text(geometry.name, [*links, *joints, *colors], _COMMENT)
 
 
-def urdf_text(name: str, parts: Iterable[etree._Element], comment: str) -> str:
-    """Return the indented URDF of a robot with a comment; ``parts``: links, joints, materials."""
-    robot = E.robot(etree.Comment(comment), *parts, name=name)
+def urdf_text(name: str, parts: Iterable[etree._Element], comment: str = "") -> str:
+    """Return the indented URDF of a robot; ``parts``: links, joints, materials."""
+    head = [etree.Comment(comment)] if comment else []
+    robot = E.robot(*head, *parts, name=name)
     etree.indent(robot, space="  ")
     text: str = etree.tostring(robot, xml_declaration=True, encoding="UTF-8").decode() + "\n"
     return text

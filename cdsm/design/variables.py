@@ -59,8 +59,8 @@ class Variable:
 
     Example:
         >>> import cdsm
-        >>> cdsm.Variable("hole_radius", 0.02, 0.04).is_continuous
-        True
+        >>> cdsm.Variable("hole_radius", 0.02, 0.04).unit
+        'm'
     """
 
     of: str

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from cdsm.cable import Cable
 from cdsm.cable_path import Site
 from cdsm.manipulator import Manipulator
-from cdsm.presets.bodies import COMMENT, JOINT_AXES, SerialBody, chain, moving_joint
+from cdsm.presets.bodies import JOINT_AXES, SerialBody, chain, moving_joint
 from cdsm.presets.prototype import ELASTIC_STAGE
 from cdsm.urdf import E, inertial, urdf_text
 from cdsm.wires.elasticity import Elasticity
@@ -127,7 +127,7 @@ def simplex() -> Manipulator:
         for pairs, wire in ((_HORIZONTAL, horizontal_wire), (_DIAGONAL, diagonal_wire))
         for a, b in pairs
     ]
-    urdf = urdf_text("simplex", parts, COMMENT)
+    urdf = urdf_text("simplex", parts)
     return Manipulator.from_urdf(urdf, [*cables, *struts], tip="head3", check_inertia=False)
 
 

@@ -61,7 +61,7 @@ class Event:
         step: In a load cycle, the number of the load at which the step ends.
         part: Where the arm of forward statics has friction: whether the event lies on the
             ``"pull"`` of the motors, or on the ``"load"`` after it. None elsewhere.
-        cause: Of buckling in a load cycle: ``"limit point"``, where an eigenvalue of K_θ is 0; or
+        cause: Of buckling in a load cycle: ``"limit point"``, where an eigenvalue of `K_θ` is 0; or
             what takes so much stiffness that the arm snaps, such as a cable that begins to slide.
     """
 

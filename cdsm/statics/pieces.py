@@ -57,13 +57,19 @@ def stage_at(model: Model, pose: Posture, stop_torque: Array, share: float) -> S
     return Stage(share, f(pose.q / f.unit - stop_torque * f.unit / f.k), f, arm)
 
 
-def equilibrium_near(model: Model, share: float, before: Stage) -> Stage | None:
-    """Find the stable equilibrium near ``before`` under another share; None if there is none."""
+def equilibrium_near(
+    model: Model, share: float, before: Stage, speed: Array | None = None
+) -> Stage | None:
+    """Find the stable equilibrium near ``before`` under another share; None if there is none.
+
+    The search begins there, or first where the ``speed`` dx/dshare of the branch leads.
+    """
     arm = model(share)
     pose = before.pose
     f = Balance(arm.at, arm.reference, arm.at_pose(pose))
     guess = pose.q / f.unit - before.point.stop_torque * f.unit / f.k
-    found = continued(f, (guess,), pose.q)
+    ahead = () if speed is None else (guess + (share - before.share) * speed,)
+    found = continued(f, (*ahead, guess), pose.q)
     return None if found is None else Stage(share, found, f, arm)
 
 
@@ -144,9 +150,10 @@ def next_on_piece(model: Model, here: Stage, share: float) -> Stage | None:
     if not is_held(model, here):
         return None
     piece = piece_of(model, here)
+    speed = rate(piece, under(piece, here, here.taut))
 
     def at(part: float) -> Stage | None:
-        stage = equilibrium_near(piece, part, here)
+        stage = equilibrium_near(piece, part, here, speed)
         if stage is None:
             return None
         between = stable_between(stage.arm.at, here.pose.q, stage.pose.q)

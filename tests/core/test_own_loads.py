@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import cdsm
-from tests.core.test_loads import ARMS, SIZES, THREE, Q, some_loads, universal
+from tests.core.test_loads import ARMS, THREE, Q, some_loads, universal
+from tests.support.arms import README_SIZES
 
 GRIPPER = cdsm.Load("link3", (0.0, 0.0, -1.2), point=(0.02, 0.0, -0.01))
 SWUNG = [
@@ -169,7 +170,7 @@ def test_wrong_loads_of_a_file_are_named(tmp_path: Path, link: str, keys: str, s
 
 def test_other_links_refuse_loads_that_hang_nowhere() -> None:
     own = universal().with_loads(cdsm.Load("link4", (0.0, 0.0, -1.0)))
-    shorter = cdsm.Geometry.universal(joints=3, cables_per_joint=3, **SIZES)
+    shorter = cdsm.Geometry.universal(joints=3, cables_per_joint=3, **README_SIZES)
     cables = cdsm.serpentine_cables(shorter, cdsm.presets.STRAND_1X19)
     with pytest.raises(cdsm.InvalidInput, match=r"loads\.link: .*'link4'"):
         own.with_geometry(shorter, cables)
