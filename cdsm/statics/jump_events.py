@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from cdsm.statics.contact_events import contact_angles, contact_kind
 from cdsm.statics.crossings import Between, Watched, crossings
-from cdsm.statics.events import Kind, buckling_joint
-from cdsm.statics.quasi_static import QuasiStaticArm, Substep
+from cdsm.statics.events import LIMIT_POINT, Event, Kind, buckling_joint
+from cdsm.statics.hung_loads import total_force
+from cdsm.statics.quasi_static import Action, QuasiStaticArm, QuasiStaticState, Substep
 from cdsm.statics.sliding import continued_sliding
 from cdsm.statics.slow_snaps import path_end
 from cdsm.statics.slow_watch import SlowStage, known_point
@@ -64,6 +67,39 @@ def events_within(
             if watch.kinds[i] in _SINCE
         ]
     return events
+
+
+def jump(
+    arm: QuasiStaticArm,
+    before: QuasiStaticState,
+    action: Callable[[float], Action],
+    way: tuple[float, float],
+    step: int,
+    watch: Watched[SlowStage],
+    latest: tuple[float, str],
+) -> tuple[QuasiStaticState, list[Event], list[Array]]:
+    """Go on where no equilibrium is near, in ever smaller steps, or by a jump.
+
+    ``way`` are the shares of the step at the begin and the end; ``latest`` share and words of the
+    last event. Returns the state at the end, the events, and the joint coordinates at each.
+    """
+    begin, goal = way
+    parts = list[Substep]()
+    events = list[Event]()
+    angles = list[Array]()
+    arm.step_to(before, action(goal), 1, f"the step to load {step}", seen=parts.append)
+    for part in parts:
+        for kind, place, stage, reason in events_within(arm, part, watch):
+            share = part.begin + stage.share * (part.end - part.begin)
+            share = begin + share * (goal - begin)
+            cause = reason
+            at_once = abs(share - latest[0]) <= PRECISION
+            if kind == "buckling" and cause != LIMIT_POINT and at_once:
+                cause = latest[1]
+            force = float(np.linalg.norm(total_force(action(share).wrench)))
+            events.append(Event(kind, place, share, force, step, cause=cause))
+            angles.append(stage.point.state.pose.q)
+    return parts[-1].after, events, angles
 
 
 def guesses_between(share: float, below: SlowStage, above: SlowStage) -> list[Array]:

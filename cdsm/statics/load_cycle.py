@@ -111,8 +111,8 @@ class LoadHistory(Result, Plotted):
 
         Holes in which a cable begins to slide, cables that go slack, pass their maximum or leave
         their law in any segment, that lift off pulleys, leave their grooves or touch them, joints
-        that reach their stops, losses of stability. They are roots within the sub-steps; what
-        begins and ends within one sub-step is not seen.
+        that reach their stops, losses of stability. They are roots within the sub-steps. What
+        begins and ends within one sub-step is noticed by the cubic through its ends and slopes.
         """
         return self._located[0]
 

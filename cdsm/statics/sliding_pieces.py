@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.friction.capstan import can_stick
+from cdsm.statics.crossings import ROUNDING, Watched
+from cdsm.statics.pieces import dip
 from cdsm.statics.quasi_static import Action, ChainArmState, QuasiStaticArm, QuasiStaticState
 from cdsm.statics.slow_watch import SlowStage
 from cdsm.statics.solve import Balance, Point, continued
@@ -22,7 +24,7 @@ from cdsm.support.values import Array, Flags
 _CHANGES = 12  # most times that the ways are changed at one load
 _STEPS = 20  # most steps of Newton's method; smooth pieces need three
 _BACK = 0.2  # flow with which a cable may slide back before it is said to stick, over the first
-_RATE = 1e-5  # change of the share for a flow of wire
+_RATE = 1e-5  # change of the share for a flow of wire, or for the rate of a quantity
 _STILL = 1e-5  # a flow of wire below this part of the largest is none
 _ROUNDING = 1e-9  # a slip below this part of the wire that T stretches is none
 
@@ -82,8 +84,7 @@ def stop_of_slip(
     """
 
     def flow(stage: SlowStage) -> Array:
-        loads = action(stage.share), action(stage.share + _RATE)
-        return _flows(arm, before, loads, ways, stage.point.x)
+        return _flows(arm, before, action, ways, stage)
 
     here, there = ends
     slides = ways != 0
@@ -107,22 +108,70 @@ def stop_of_slip(
     return here.share + min(max(part, 0.02), 0.9) * (there.share - here.share)
 
 
+def dip_within(
+    arm: QuasiStaticArm,
+    before: QuasiStaticState,
+    action: Callable[[float], Action],
+    ways: Ways,
+    ends: tuple[SlowStage, SlowStage],
+    watch: Watched[SlowStage],
+    positive: Flags,
+) -> float | None:
+    """Return a share between two ends at which a quantity may be negative, or None.
+
+    Cables slide as ``ways`` after the first end. ``positive`` (m,) are those that may dip, positive
+    at the first end. They are taken for the cubics through both ends with their slopes.
+    """
+    here, there = ends
+    length = there.share - here.share
+    first, last = watch.value(here), watch.value(there)
+    may = positive & np.isfinite(last) & (last > ROUNDING * watch.scale(there))
+    if length <= _RATE or not may.any():
+        return None
+
+    def slope(stage: SlowStage, ways: Ways) -> Array:
+        change = watch.value(_next(arm, before, action, ways, stage)) - watch.value(stage)
+        return np.asarray(change * length / _RATE)
+
+    falls = slope(here, ways)
+    may &= first + falls < 0.0  # a convex quantity lies above its tangent
+    if not may.any():
+        return None
+    state = there.point.state
+    assert isinstance(state, ChainArmState)
+    rises = slope(there, ways_of(state))
+    part = dip((first[may], falls[may]), (last[may], rises[may]))
+    return None if part is None else here.share + part * length
+
+
+def _next(
+    arm: QuasiStaticArm,
+    before: QuasiStaticState,
+    action: Callable[[float], Action],
+    ways: Ways,
+    stage: SlowStage,
+) -> SlowStage:
+    """Return the equilibrium :data:`_RATE` of the step after one on a piece, by a Newton step."""
+    share = stage.share + _RATE
+    f = arm.balance(before, action(share), ways)
+    point = f(stage.point.x)
+    step = np.linalg.lstsq(point.slope, -point.value)[0]
+    return SlowStage(share, f(stage.point.x + step), f)
+
+
 def _flows(
     arm: QuasiStaticArm,
     before: QuasiStaticState,
-    loads: tuple[Action, Action],
+    action: Callable[[float], Action],
     ways: Ways,
-    x: Array,
+    stage: SlowStage,
 ) -> Array:
-    """Return the wire (S,) that slips to the next segment from one load to another, nearby.
+    """Return the wire (S,) that slips to the next segment from a load to another, nearby.
 
-    Over the way that cables slide: negative where one would slide back. ``x`` is the equilibrium
-    under the first load.
+    Over the way that cables slide: negative where one would slide back.
     """
-    here = arm.balance(before, loads[0], ways)(x)
-    f = arm.balance(before, loads[1], ways)
-    step = np.linalg.lstsq(here.slope, here.value - f(x).value)[0]
-    states = here.state, f(x + step).state
+    here = arm.balance(before, action(stage.share), ways)(stage.point.x)
+    states = here.state, _next(arm, before, action, ways, stage).point.state
     first, last = (s.chain.slip for s in states if isinstance(s, ChainArmState))
     flow = ways * (last - first)
     least = _STILL * float(abs(flow).max(initial=0.0))

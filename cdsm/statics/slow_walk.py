@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.statics.crossings import ROUNDING, Between, Watched
-from cdsm.statics.events import LIMIT_POINT, Event, Kind, event_words
+from cdsm.statics.events import Event, Kind, event_words
 from cdsm.statics.hung_loads import total_force
-from cdsm.statics.jump_events import PRECISION, events_within, guesses_between, kind_at
+from cdsm.statics.jump_events import PRECISION, guesses_between, jump, kind_at
 from cdsm.statics.pieces import root
 from cdsm.statics.quasi_static import (
     Action,
@@ -25,10 +26,9 @@ from cdsm.statics.quasi_static import (
     EquilibriumPath,
     QuasiStaticArm,
     QuasiStaticState,
-    Substep,
 )
 from cdsm.statics.sliding import continued_sliding
-from cdsm.statics.sliding_pieces import on_piece, stop_of_slip, ways_of
+from cdsm.statics.sliding_pieces import dip_within, on_piece, stop_of_slip, ways_of
 from cdsm.statics.slow_watch import SlowStage, known_point
 from cdsm.support.values import Array
 
@@ -36,6 +36,8 @@ _ZERO = 0.1  # part of this rounding that ends the search for a root
 _NEXT = 4.0  # the way to look for the next event, over that to the last one
 _LEAST = 2.0**-6  # least way between events that are located one by one, over a sub-step
 _FINEST = 2.0**-6  # least way to where a cable stops to slide in a hole, over a sub-step
+
+_Acting = Callable[[float], Action]  # what acts at a share of the step
 
 
 class Walk:
@@ -68,19 +70,20 @@ class Walk:
 
     def along_path(self, step: int, load: Action, near: EquilibriumPath) -> None:
         """Go to a load in the sub-steps of its path, and note the events but for slips."""
-        begin = self._state.load
+        action = partial(self._state.load.interpolate, load)
         self._here = self._here._replace(share=0.0)
         self._latest = math.nan, ""
         self._wanted = ~self._slips
         for goal in sorted(near):
-            self._go(step, begin, load, goal, math.inf, near)
+            while self._here.share < goal:
+                self._go(step, action, goal, math.inf, near)
         self._wanted = np.ones_like(self._slips)
 
     def to_load(
         self, step: int, load: Action, substeps: int, near: EquilibriumPath, *, once: bool
     ) -> None:
         """Go to a load in sub-steps, and note the events; of a hole its first slip if ``once``."""
-        begin = self._state.load
+        action = partial(self._state.load.interpolate, load)
         self._here = self._here._replace(share=0.0)
         self._latest = math.nan, ""
         self._once = once
@@ -91,22 +94,18 @@ class Walk:
             before = self._here.share
             done = math.floor(before * substeps * (1.0 + ROUNDING))
             goal = min(1.0, (done + 1.0) / substeps)
-            if self._go_on_piece(step, begin, load, goal):
+            if self._go_on_piece(step, action, goal):
                 continue
             goal = before + part if before + 1.5 * part < 1.0 else 1.0
-            if not self._go(step, begin, load, goal, least, near):
+            if not self._go(step, action, goal, least, near):
                 part = max(part / 2.0, least)
             elif self._here.share < goal:  # the next event is likely to be as near as this one
                 part = max(_NEXT * (self._here.share - before), least)
             else:
                 part = min(2.0 * part, 1.0 / substeps)
 
-    def _go_on_piece(self, step: int, begin: Action, load: Action, goal: float) -> bool:
+    def _go_on_piece(self, step: int, action: _Acting, goal: float) -> bool:
         """Go to the next event, or to ``goal``, while cables slide as they do; False: not found."""
-
-        def action(share: float) -> Action:
-            return begin.interpolate(load, share)
-
         keep = np.zeros((2, self._ways.size), dtype=np.bool_)
         keep[:, self._hole] = self._open[self._slips].reshape(2, -1)
 
@@ -128,7 +127,11 @@ class Walk:
                 break
             goal = turn
         between = Between(solve, self._here, there)
-        passed, stage = self._first(between, there)
+        dip = self._dip(there, action)
+        middle = there if dip is None else between.find(dip)
+        if middle is None:  # such as where a cable is slack
+            return False
+        passed, stage = self._first(between, middle if self._negative(middle).any() else there)
         f = self._arm.balance(self._state, action(stage.share))
         point = continued_sliding(f, [stage.point.x], self._state.arm_state.pose.q)
         if point is None:
@@ -142,9 +145,7 @@ class Walk:
             self._note(step, i, confirmed, kind_at(self._watch, i, between, stage.share), action)
         return True
 
-    def _note(
-        self, step: int, i: int, stage: SlowStage, kind: Kind, action: Callable[[float], Action]
-    ) -> None:
+    def _note(self, step: int, i: int, stage: SlowStage, kind: Kind, action: _Acting) -> None:
         """Note an event: quantity i has become negative at ``stage``."""
         self._passed[i] = True
         self._latest = stage.share, event_words(kind, self._watch.places[i])
@@ -160,21 +161,12 @@ class Walk:
         self.angles.append(stage.point.state.pose.q)
 
     def _go(
-        self,
-        step: int,
-        begin: Action,
-        load: Action,
-        goal: float,
-        least: float,
-        near: EquilibriumPath,
+        self, step: int, action: _Acting, goal: float, least: float, near: EquilibriumPath
     ) -> bool:
         """Go to the next event, or to the share ``goal`` of the step; False if it is too far.
 
         Within ``least`` all events are located from one history: they are close together.
         """
-
-        def action(share: float) -> Action:
-            return begin.interpolate(load, share)
 
         def near_points(share: float, guesses: list[Array]) -> SlowStage | None:
             f = self._arm.balance(self._state, action(share))
@@ -192,6 +184,10 @@ class Walk:
             self._jump(step, action, goal)
             return True
         between = Between(solve, self._here, there)
+        dip = self._dip(there, action)
+        middle = None if dip is None else between.find(dip)
+        if middle is not None and self._negative(middle).any():
+            there = middle
         if close:
             roots = self._roots(between, there)
         else:
@@ -210,11 +206,21 @@ class Walk:
         """Which quantities (m,) are an event if they become negative."""
         return ~self._passed & self._wanted
 
+    def _negative(self, stage: SlowStage) -> NDArray[np.bool_]:
+        """Return which quantities (m,) have become negative at a stage, which is an event."""
+        return self._open & (self._watch.value(stage) < -self._none)
+
+    def _dip(self, there: SlowStage, action: _Acting) -> float | None:
+        """Return a share before ``there`` at which a quantity may be negative, or None."""
+        ends = self._here, there
+        positive = self._open & (self._values > self._none)
+        return dip_within(self._arm, self._state, action, self._ways, ends, self._watch, positive)
+
     def _roots(self, between: Between[SlowStage], there: SlowStage) -> list[tuple[int, SlowStage]]:
         """Return all quantities that pass before ``there``, and where, in their order."""
         after = self._watch.value(there)
         roots = list[tuple[int, SlowStage]]()
-        for i in np.flatnonzero(self._open & (after < -self._none)).tolist():
+        for i in np.flatnonzero(self._negative(there)).tolist():
             share = self._root(between, there, i, {there.share: after})
             roots.append((i, between.find(share) or there))
         return sorted(roots, key=lambda root: root[1].share)
@@ -250,7 +256,7 @@ class Walk:
         before = self._values
         after = self._watch.value(there)
         known = {there.share: after}
-        passes = np.flatnonzero(self._open & (after < -self._none))
+        passes = np.flatnonzero(self._negative(there))
         if not passes.size:
             return [], there
         share = there.share
@@ -278,32 +284,14 @@ class Walk:
         self._passed &= self._values <= self._none
         self._passed |= self._values < -self._none
 
-    def _jump(self, step: int, action: Callable[[float], Action], goal: float) -> None:
+    def _jump(self, step: int, action: _Acting, goal: float) -> None:
         """Go to ``goal`` where no equilibrium is near, in ever smaller steps, or by a jump."""
-        parts = list[Substep]()
-        begin = self._here.share
-        what = f"the step to load {step}"
-        self._arm.step_to(self._state, action(goal), 1, what, seen=parts.append)
-        for part in parts:
-            for kind, place, stage, reason in events_within(self._arm, part, self._watch):
-                share = part.begin + stage.share * (part.end - part.begin)
-                share = begin + share * (goal - begin)
-                cause = reason
-                at_once = abs(share - self._latest[0]) <= PRECISION
-                if kind == "buckling" and cause != LIMIT_POINT and at_once:
-                    cause = self._latest[1]
-                self.events.append(
-                    Event(
-                        kind,
-                        place,
-                        share,
-                        float(np.linalg.norm(total_force(action(share).wrench))),
-                        step,
-                        cause=cause,
-                    )
-                )
-                self.angles.append(stage.point.state.pose.q)
-        after = parts[-1].after
+        way = self._here.share, goal
+        after, events, angles = jump(
+            self._arm, self._state, action, way, step, self._watch, self._latest
+        )
+        self.events += events
+        self.angles += angles
         f = self._arm.balance(after, after.load)
         point = known_point(f, after.arm_state, after.x)._replace(stop_torque=after.stop_torque)
         self._stand(SlowStage(goal, point, f), after.load)
