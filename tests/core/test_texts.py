@@ -1,5 +1,6 @@
 """What results print is what they hold: names, numbers and units, read back from the text."""
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -42,6 +43,9 @@ def test_rest_lengths_of_a_plan_are_those_without_strain() -> None:
     pose = short_arm().at(POSE.q)
     reach = cdsm.stiffness_range(pose, "z", 10.0, 200.0)
     plan = cdsm.plan_stiffness(pose, "z", 0.5 * (reach.low + reach.high), 10.0, 200.0)
+    missed = replace(plan, target=1.5 * np.asarray(plan.target))
+    said = numbers(str(missed), "along (0, 0, 1): {} ({} wanted)")
+    require_all(zip(said, map(float, (plan.achieved, missed.target)), strict=True))
     unstrained = pose.cable_lengths / (1.0 + plan.tension.values / 48e3)
     np.testing.assert_allclose(plan.rest_lengths, unstrained, rtol=1e-12)
     np.testing.assert_allclose(plan.cable_lengths, pose.cable_lengths)

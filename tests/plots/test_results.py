@@ -262,8 +262,10 @@ def test_planned_tests_have_their_counts_and_intervals() -> None:
         bar = artists(left, f"interval:{name}")[f"interval:{name}"]
         assert bar.get_width() == pytest.approx(100.0 * part)
     assert rows(left) == [*plan.names]
-    heights = [bar.get_height() for bar in artists(right, "tests:").values()]
-    assert heights == plan.counts.tolist()
+    bars = artists(right, "tests:").values()
+    assert [bar.get_height() for bar in bars] == plan.counts.tolist()
+    middles = [bar.get_x() + bar.get_width() / 2.0 for bar in bars]
+    np.testing.assert_allclose(middles, np.arange(len(plan.counts)), atol=1e-9)
     assert left.get_xlabel() == "95 % interval, ± [% of the expected value]"
     assert f"{plan.counts.sum()} tests chosen" in words(axs)
     assert (right.get_xlabel(), right.get_ylabel()) == ("candidate", "tests")
