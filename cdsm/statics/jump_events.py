@@ -11,7 +11,7 @@ from cdsm.statics.crossings import Between, Watched, crossings
 from cdsm.statics.events import LIMIT_POINT, Event, Kind, buckling_joint
 from cdsm.statics.hung_loads import total_force
 from cdsm.statics.quasi_static import Action, QuasiStaticArm, QuasiStaticState, Substep
-from cdsm.statics.sliding import continued_sliding
+from cdsm.statics.sliding import reached_without_snap
 from cdsm.statics.slow_snaps import path_end
 from cdsm.statics.slow_watch import SlowStage, known_point
 from cdsm.statics.solve import Balance
@@ -33,7 +33,7 @@ def events_within(
     def solve(share: float, below: SlowStage, above: SlowStage) -> SlowStage | None:
         f = balance(share)
         guesses = [*guesses_between(share, below, above), part.before.x]
-        point = continued_sliding(f, guesses, part.before.arm_state.pose.q)
+        point = reached_without_snap(f, guesses, part.before.arm_state.pose.q)
         return None if point is None else SlowStage(share, point, f)
 
     f = arm.balance(part.before, part.before.load)

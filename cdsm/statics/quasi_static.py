@@ -21,7 +21,7 @@ from cdsm.friction.capstan import ChainProblem, ChainState, chain_tangent
 from cdsm.motors import refuse_rough
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm, require_domain
-from cdsm.statics.sliding import continued_sliding, settle_sliding
+from cdsm.statics.sliding import continued_sliding, is_held_to, settle_sliding
 from cdsm.statics.solve import ArmState, Balance, Point
 from cdsm.support.values import Array, frozen
 from cdsm.terms import stiffness_of, torque_of, torque_size_of
@@ -31,6 +31,7 @@ EquilibriumPath = Mapping[float, Array]
 
 NO_PATH: Final[EquilibriumPath] = {}
 _SHORTEST = 2.0**-8  # shortest sub-step, as a part of the step between two loads
+_STEEP = 2.0**-16  # the same where the arm moves so far that it may have snapped through
 
 
 class Action(NamedTuple):
@@ -156,12 +157,12 @@ class QuasiStaticArm:
             known = [near[goal]] if goal in near else []
             guesses = [*known, state.x + motion, state.x]
             point: Point | None = continued_sliding(f, guesses, old.pose.q)
-            jumps = point is None
-            if point is None and goal - done > _SHORTEST:
+            jumps = point is None or not is_held_to(f, old.pose.q, point)
+            if jumps and goal - done > (_SHORTEST if point is None else _STEEP):
                 part = (goal - done) / 2.0
                 motion = 0.0 * motion
                 continue
-            if point is None:
+            if jumps or point is None:
                 point = settle_sliding(f, old.pose.q, done, what)
                 snapped = True
             new = point.state

@@ -15,9 +15,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from cdsm.errors import EquilibriumError
+from cdsm.errors import CdsmError, EquilibriumError
 from cdsm.readings import least_real_part
-from cdsm.statics.solve import BALANCED, FAR, Balance, Point, continued, settle
+from cdsm.statics.solve import BALANCED, FAR, Balance, Point, continued, settle, stable_between
 from cdsm.support.values import Array
 
 _NEWTON = 30  # most steps of Newton's method; near an equilibrium it takes 3 to 6
@@ -36,7 +36,8 @@ def continued_sliding(f: Balance, guesses: Iterable[Array], before: Array) -> Po
     """Find the stable equilibrium near the angles ``before`` (nv,), also where cables slide.
 
     It is that of :func:`~cdsm.statics.solve.continued`. Where there is none, and K is not
-    symmetric, it is one at which all eigenvalues of K have positive real parts.
+    symmetric, it is one at which all eigenvalues of K have positive real parts. The arm may snap
+    through on the way to it: :func:`is_held_to` tells.
     """
     starts = [*guesses]
     found = continued(f, starts, before)
@@ -44,6 +45,24 @@ def continued_sliding(f: Balance, guesses: Iterable[Array], before: Array) -> Po
         ends = (_newton(f, f.attempt(x), before) for x in starts)
         found = next((point for point in ends if point is not None), None)
     return found
+
+
+def is_held_to(f: Balance, before: Array, there: Point) -> bool:
+    """Return whether the arm is stable on the way from the angles ``before`` to an equilibrium."""
+
+    def least(K: Array) -> float:
+        return least_real_part(K)[0]
+
+    try:
+        return stable_between(lambda q: f(q / f.unit).state, before, there.state.pose.q, least)
+    except CdsmError:  # such as where two sites coincide
+        return False
+
+
+def reached_without_snap(f: Balance, guesses: Iterable[Array], before: Array) -> Point | None:
+    """Find the stable equilibrium near ``before`` (nv,) to which the arm does not snap, or None."""
+    found = continued_sliding(f, guesses, before)
+    return found if found is not None and is_held_to(f, before, found) else None
 
 
 def settle_sliding(f: Balance, q: Array, reached: float, load: str) -> Point:

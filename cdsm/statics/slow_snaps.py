@@ -30,7 +30,7 @@ SINGULAR = 1e-8
 
 _FIRST = 1e-9  # first distance along the path [rad], which is doubled
 _FARTHEST = 0.1  # last one [rad]
-_RATE = 1e-7  # change of the share for a difference
+_RATE = 1e-3  # change of the share for a difference: of a sub-step, which may be very short
 _NEWTON = 20  # most steps
 _EXACT = 1e-13  # largest |f|, over its scale, and part of the distance that may be missed
 _PRECISE = 1e-12  # of a root, relative

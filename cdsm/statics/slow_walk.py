@@ -27,7 +27,7 @@ from cdsm.statics.quasi_static import (
     QuasiStaticArm,
     QuasiStaticState,
 )
-from cdsm.statics.sliding import continued_sliding
+from cdsm.statics.sliding import reached_without_snap
 from cdsm.statics.sliding_pieces import dip_within, on_piece, stop_of_slip, ways_of
 from cdsm.statics.slow_watch import SlowStage, known_point
 from cdsm.support.values import Array
@@ -133,7 +133,7 @@ class Walk:
             return False
         passed, stage = self._first(between, middle if self._negative(middle).any() else there)
         f = self._arm.balance(self._state, action(stage.share))
-        point = continued_sliding(f, [stage.point.x], self._state.arm_state.pose.q)
+        point = reached_without_snap(f, [stage.point.x], self._state.arm_state.pose.q)
         if point is None:
             return False
         confirmed = SlowStage(stage.share, point, f)
@@ -170,7 +170,8 @@ class Walk:
 
         def near_points(share: float, guesses: list[Array]) -> SlowStage | None:
             f = self._arm.balance(self._state, action(share))
-            point = continued_sliding(f, [*guesses, self._state.x], self._state.arm_state.pose.q)
+            starts = [*guesses, self._state.x]
+            point = reached_without_snap(f, starts, self._state.arm_state.pose.q)
             return None if point is None else SlowStage(share, point, f)
 
         def solve(share: float, below: SlowStage, above: SlowStage) -> SlowStage | None:

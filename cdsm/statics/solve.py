@@ -166,16 +166,27 @@ def continued(
     return None
 
 
-def stable_between(at: Callable[[Array], ArmState], before: Array, after: Array) -> bool:
-    """Return whether K is positive definite along the straight way between two equilibria.
+def least_of_symmetric(K: Array) -> float:
+    """Return the smallest eigenvalue of the symmetric part of K."""
+    return float(np.linalg.eigvalsh(K + K.T)[0]) / 2.0
+
+
+def stable_between(
+    at: Callable[[Array], ArmState],
+    before: Array,
+    after: Array,
+    least: Callable[[Array], float] = least_of_symmetric,
+) -> bool:
+    """Return whether the ``least`` eigenvalue of K is positive on the way between two equilibria.
 
     If it is not, the arm snaps through, though the search has stepped over the unstable postures.
+    The way is straight.
     """
     free = before != after
     length = float(abs(after - before).max())
     for part in np.arange(_DENSE, length, _DENSE) / max(length, _DENSE):
         K = at(before + part * (after - before)).stiffness[np.ix_(free, free)]
-        if np.linalg.eigvalsh(K + K.T)[0] <= 0.0:
+        if least(K) <= 0.0:
             return False
     return True
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 import cdsm
 from cdsm import Site
@@ -99,3 +99,31 @@ def test_an_arm_snaps_as_a_cable_begins_to_slide(mu: float) -> None:
     assert abs(np.log(T[cable] / PULL)) == pytest.approx(there.segments.grip[cable], abs=1e-8)
     # sliding in both holes the push falls at once, sticking in one it grows
     assert push_at(arm, q + 1e-5, (-1, 1)) < push_at(arm, q, (-1, 1))
+
+
+@pytest.mark.parametrize("substeps", [1, 8])
+@pytest.mark.parametrize("tilt", [0.02, 0.05])
+def test_a_small_snap_is_no_smooth_motion(tilt: float, substeps: int) -> None:
+    """The column leans by a few degrees; pushed over, it comes to rest near its other side."""
+    arm = column(0.0)
+
+    def torque(q: float, down: float) -> float:
+        pose = arm.at([q])
+        cables = float(np.full(2, PULL) @ pose.length_jacobian[:, 0])
+        return SPRING * q + cables - LEVER * down * np.sin(q)
+
+    down = brentq(lambda down: torque(tilt, down), 5.0, 50.0)
+    fold = minimize_scalar(
+        lambda q: torque(q, down) / (LEVER * np.cos(q)), bounds=(0.0, tilt), options={"xatol": 1e-9}
+    )
+    loads = [
+        [cdsm.Load("bar", force=(-down, side * fold.fun, 0), point=(LEVER, 0, 0))]
+        for side in (-1.5, 1.5)  # the step of 3 passes the fold after 2.5
+    ]
+    history = cdsm.load_cycle(arm.at([0.0]), [PULL, PULL], loads, substeps=substeps)
+    event, angle = snap(history)
+    assert (event.step, event.cause) == (1, "limit point")
+    assert event.share == pytest.approx(2.5 / 3.0, abs=1e-6)
+    assert abs(angle) == pytest.approx(fold.x, rel=1e-3)
+    assert abs(history.angles[1, 0] - history.angles[0, 0]) < 2.5 * tilt
+    assert history.warnings == ("SNAPS THROUGH at load 1",)
