@@ -15,7 +15,7 @@ Kind = Literal[
     "slip", "slack", "stop", "maximum", "law", "lift-off", "groove", "contact", "buckling"
 ]
 
-Part = Literal["pull", "load"]
+PathPart = Literal["pull", "load"]
 """Part of the way of :func:`~cdsm.forward_statics` with friction: motors pull, then it bears."""
 
 _WORDS: Final[dict[Kind, str]] = {
@@ -70,7 +70,7 @@ class Event:
     share: float
     load: float
     step: int | None = None
-    part: Part | None = None
+    part: PathPart | None = None
     cause: str = ""
 
     def __str__(self) -> str:

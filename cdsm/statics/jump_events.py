@@ -18,7 +18,7 @@ from cdsm.statics.solve import Balance
 from cdsm.support.values import Array
 
 _HALVINGS = 48  # of a sub-step in which the arm loses its stability
-PRECISION = 1e-12  # of a root, relative to its sub-step: equilibria are no better
+ROOT_PRECISION = 1e-12  # of a root, relative to its sub-step: equilibria are no better
 _SINCE: tuple[Kind, ...] = ("slack", "maximum", "law", "stop")  # what a jump may bring about
 
 
@@ -50,7 +50,7 @@ def events_within(
             low, high, last = (low, middle, last) if stage is None else (middle, high, stage)
     end = path_end(balance, last, watch) if part.snapped else None
     between = Between(solve, here, last)
-    roots = sorted(crossings(between, here, last, watch, PRECISION), key=lambda root: root[1])
+    roots = sorted(crossings(between, here, last, watch, ROOT_PRECISION), key=lambda root: root[1])
     events = [
         (kind_at(watch, i, between, share), watch.places[i], between.at(share), "")
         for i, share in roots
@@ -93,7 +93,7 @@ def jump(
             share = part.begin + stage.share * (part.end - part.begin)
             share = begin + share * (goal - begin)
             cause = reason
-            at_once = abs(share - latest[0]) <= PRECISION
+            at_once = abs(share - latest[0]) <= ROOT_PRECISION
             if kind == "buckling" and cause != LIMIT_POINT and at_once:
                 cause = latest[1]
             force = float(np.linalg.norm(total_force(action(share).wrench)))

@@ -19,7 +19,7 @@ from cdsm.loads import LoadsLike, has_loads, loads_of
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
-from cdsm.statics.events import Event, Part, events_text
+from cdsm.statics.events import Event, PathPart, events_text
 from cdsm.statics.hung_loads import HungLoad, hung_loads, total_force
 from cdsm.statics.quasi_static import (
     NO_PATH,
@@ -444,7 +444,7 @@ class Approach(NamedTuple):
     motors: Array  # commands (C,), as those of a LoadHistory
     substeps: int  # number of equal steps on the way
     what: str  # name of the way, in errors
-    part: Part | None = None  # of forward statics
+    part: PathPart | None = None  # of forward statics
 
 
 def approach(

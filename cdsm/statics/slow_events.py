@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.statics.events import Event, Part
+from cdsm.statics.events import Event, PathPart
 from cdsm.statics.quasi_static import (
     Action,
     EquilibriumPath,
@@ -34,7 +34,7 @@ class Way(NamedTuple):
     loads: tuple[Action, ...]  # at the end of each step
     substeps: tuple[int, ...]
     paths: tuple[EquilibriumPath, ...]  # the equilibria on the way to each load
-    parts: tuple[Part | None, ...]  # of forward statics, each step
+    parts: tuple[PathPart | None, ...]  # of forward statics, each step
     begin: float = 0.0  # share of the first step that the start has behind it
 
 

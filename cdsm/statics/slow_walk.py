@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from cdsm.statics.crossings import ROUNDING, Between, Watched
 from cdsm.statics.events import Event, Kind, event_words
 from cdsm.statics.hung_loads import total_force
-from cdsm.statics.jump_events import PRECISION, guesses_between, jump, kind_at
+from cdsm.statics.jump_events import ROOT_PRECISION, guesses_between, jump, kind_at
 from cdsm.statics.pieces import root
 from cdsm.statics.quasi_static import (
     Action,
@@ -249,7 +249,7 @@ class Walk:
         end = there.share if end is None else end
         if value(end) >= 0.0:
             return end
-        precision = PRECISION * (there.share - self._here.share)
+        precision = ROOT_PRECISION * (there.share - self._here.share)
         return root(value, self._here.share, end, precision)
 
     def _first(self, between: Between[SlowStage], there: SlowStage) -> tuple[list[int], SlowStage]:
