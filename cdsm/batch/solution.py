@@ -185,7 +185,7 @@ def _source() -> Path:
 def solve_rows(rows: Rows, threads: int = 1) -> tuple[dict[str, NDArray[Any]], Codes]:
     """Compute the quantities of all rows by name (N, …), and the status (N,) of each row."""
     if rows.bounds is not None:
-        remedy = "Give tension=, or use distribute_tension(pose, assembly=) posture by posture."
+        remedy = "Give tensions, or take distribute_tension(pose, assembly=) posture by posture."
         refuse_shared(rows.arm.motors, "minimum", remedy)
     if rows.arm.wraps is not None and rows.touching is None:
         return solve_wrapped(rows, threads, contact_kernels(len(rows.q)), solve_rows)

@@ -34,7 +34,17 @@ class Beam:
         if self.outer_diameter is not None and self.inner_diameter >= self.outer_diameter:
             problem = f"{self.inner_diameter:g} m given, not below outer_diameter"
             return [f"inner_diameter: {problem}, {self.outer_diameter:g} m"]
-        return []
+        is_tube = self.outer_diameter is not None
+        if self.inner_diameter and not is_tube:
+            return ["inner_diameter: belongs to outer_diameter and youngs_modulus, give them"]
+        if is_tube or self.bending_stiffness is not None:
+            return []
+        bends = "bending_stiffness, or outer_diameter and youngs_modulus"
+        return [
+            f"{key}: belongs to links that bend; give {bends}"
+            for key, usual in (("torsion_stiffness", None), ("poisson", 0.3), ("pieces", 1))
+            if getattr(self, key) != usual
+        ]
 
     def stiffness(self) -> dict[str, Any]:
         """Return EI = E π (D⁴ − d⁴)/64, GJ = EI/(1 + ν) and the pieces; empty if it is rigid."""

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 import cdsm
 from cdsm.support.values import Array
+from tests.support.arms import readme_geometry
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -198,3 +199,18 @@ def test_beams_that_cannot_be_are_named(given: dict[str, float], said: str) -> N
     section = {"length": 0.2, "disks": 10, "hole_angles": [0.0], "hole_radius": 0.01}
     with pytest.raises(cdsm.GeometryError, match=said):
         cdsm.Geometry.backbone(sections=[section], **given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"pieces": 2}, "pieces: belongs to links that bend; give bending_stiffness, or"),
+        ({"poisson": 0.4}, "poisson: belongs to links that bend"),
+        ({"torsion_stiffness": 1.0}, "torsion_stiffness: belongs to links that bend"),
+        ({"inner_diameter": 1e-3}, "inner_diameter: belongs to outer_diameter"),
+        ({"inner_diameter": 1e-3, "bending_stiffness": 1.0}, "inner_diameter: belongs to outer"),
+    ],
+)
+def test_what_no_beam_would_use_is_refused(given: Any, said: str) -> None:
+    with pytest.raises(cdsm.GeometryError, match=said):
+        readme_geometry(**given)
