@@ -103,12 +103,6 @@ def changes_of(texts: Iterable[str] | None) -> dict[str, Any]:
     return changes
 
 
-def python_of(arm: Path, changes: Iterable[str] | None) -> str:
-    """Return Python that reads an arm, with the changes of --set."""
-    changed = changes_of(changes)
-    return f"cdsm.Manipulator.read({str(arm)!r}{f', changes={changed!r}' if changed else ''})"
-
-
 def load_arm(arm: Path, changes: Iterable[str] | None) -> cdsm.Manipulator:
     """Read an arm, with the changes of --set."""
     return cdsm.Manipulator.read(arm, changes=changes_of(changes))

@@ -74,10 +74,12 @@ def show_stiffness(
     lines += [share] if share and K.distribution is None else []  # a Tension prints it itself
     sure, uncertainty = _uncertainty(K.distribution, axes)
     if check or out is not None:
+        from cdsm.arm_file.source import ArmSource
+
         report = (rest or K).report()
         changed = " ".join(f"--set {shlex.quote(change)}" for change in changes or ())
         about = f"{arm} {changed}".rstrip() + f"\n{head}\ncdsm {cdsm.__version__}"
-        source = options.python_of(arm, changes)
+        source = ArmSource(str(arm), options.changes_of(changes)).python
         write(out, lambda file: report.write(file, about, direction and axes[direction], source))
         failed = () if report.passed else (f"{report.outcome}: the report says why.",)
         output = numbers | report.to_dict() | uncertainty

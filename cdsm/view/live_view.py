@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Self, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.arm_file.source import ArmSource
 from cdsm.errors import CdsmError, InvalidInput, listed, need
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path import checked_path
@@ -28,7 +29,6 @@ from cdsm.view.history import History
 from cdsm.view.panel import Panel, loadable_links
 from cdsm.view.path_player import Player, tips_of
 from cdsm.view.saving import (
-    Source,
     command_text,
     draw_picture,
     file_name,
@@ -126,7 +126,7 @@ def serve(
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(_PANEL)
-        view = View(arm, start, server, Source(os.fspath(file or ""), changes or {}))
+        view = View(arm, start, server, ArmSource(os.fspath(file or ""), changes or {}))
         if path is not None and route is not None:
             view.add_path(path, route)
     except BaseException:
@@ -151,7 +151,7 @@ class View:
     """Running live view of ``arm``, made by :func:`serve`. Close it, or use it in ``with``."""
 
     def __init__(
-        self, arm: Manipulator, start: Setting, server: viser.ViserServer, source: Source
+        self, arm: Manipulator, start: Setting, server: viser.ViserServer, source: ArmSource
     ) -> None:
         self.arm = arm
         self._source = source

@@ -5,56 +5,24 @@ from __future__ import annotations
 import math
 import re
 import shlex
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Final, final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdsm.arm_file.source import ArmSource
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import plot_arm
 from cdsm.plots.projection import VIEW
 from cdsm.plots.style import MM, save_figure
 from cdsm.status import Status
 from cdsm.support.format import JointUnits
-from cdsm.support.records import set_texts
 from cdsm.view.state import Setting, Shown
 
 if TYPE_CHECKING:
     import viser
-
-
-@final
-@dataclass(frozen=True)
-class Source:
-    """Where an arm comes from, for the lines that compute the same: its file, if it has one."""
-
-    file: str = ""
-    changes: Mapping[str, Any] = field(default_factory=dict)  # laid over the keys of the file
-
-    @property
-    def arguments(self) -> str:
-        """The file and the changes, as arguments of a command."""
-        changed = (f" --set {shlex.quote(text)}" for text in set_texts(self.changes))
-        return shlex.quote(self.file or _FILE) + "".join(changed)
-
-    @property
-    def python(self) -> str:
-        """Python that reads the arm."""
-        changed = f", changes={dict(self.changes)!r}" if self.changes else ""
-        return f"cdsm.Manipulator.read({self.file or _FILE!r}{changed})"
-
-    @property
-    def remark(self) -> str:
-        """What the reader of the lines has to do."""
-        if self.file:
-            return "run it where it was started"
-        return f"put the name of your file for {_FILE}"
-
-
-_FILE: Final = "ARM.toml"
 
 
 def draw_picture(shown: Shown, view: tuple[float, float] = VIEW) -> bytes | None:
@@ -90,7 +58,7 @@ def file_name(arm: Manipulator, ending: str) -> str:
 
 
 def posture_text(
-    arm: Manipulator, shown: Shown, source: Source, numbers: Iterable[str] = ()
+    arm: Manipulator, shown: Shown, source: ArmSource, numbers: Iterable[str] = ()
 ) -> str:
     """Write a program that computes what is shown; its first lines have the command for it.
 
@@ -111,7 +79,7 @@ def posture_text(
     )
 
 
-def command_text(arm: Manipulator, setting: Setting, source: Source) -> str:
+def command_text(arm: Manipulator, setting: Setting, source: ArmSource) -> str:
     """Write the command that computes the numbers."""
     command = "stiffness"
     parts = list[str]()

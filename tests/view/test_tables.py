@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.arm_file.source import ArmSource
 from cdsm.support.format import prepare_json
-from cdsm.view.saving import Source, command_text
+from cdsm.view.saving import command_text
 from cdsm.view.state import Setting, Shown, show
 from cdsm.view.texts import tensions_text
 from cdsm.wires.ropes import breaking_force
@@ -62,7 +63,7 @@ def rows(shown: Shown) -> dict[str, Row]:
     return {re.split(r"[,:] ", row.what)[0]: row for row in found}
 
 
-def answer_of(arm: cdsm.Manipulator, setting: Setting, source: Source) -> dict[str, Any]:
+def answer_of(arm: cdsm.Manipulator, setting: Setting, source: ArmSource) -> dict[str, Any]:
     """JSON of the command that the page writes, or of the equilibrium that its arm sags to."""
     if setting.sag:
         pose = arm.at(setting.q)
@@ -102,7 +103,7 @@ def require_shares(shown: Shown, F: dict[str, float]) -> None:
 @pytest.mark.parametrize("case", CASES)
 def test_rows_of_the_page_are_numbers_of_the_json(case: str) -> None:
     name, changes, setting = CASES[case]
-    source = Source(f"{EXAMPLES}/{name}.toml", changes)
+    source = ArmSource(f"{EXAMPLES}/{name}.toml", changes)
     arm = cdsm.Manipulator.read(source.file, changes=changes)
     if setting.pull is not None:
         setting = replace(setting, q=np.zeros(arm.nv))
