@@ -8,12 +8,15 @@ anew at each trial.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from cdsm.manipulator import Manipulator
+from cdsm.routing import Indices
+from cdsm.statics.contact_events import contact_kinds
 from cdsm.statics.events import Kind
 from cdsm.statics.pieces import PRECISION, root
 from cdsm.support.values import Array
@@ -39,6 +42,22 @@ class Watched(NamedTuple, Generic[S]):
     places: tuple[str, ...]
     value: Callable[[S], Array]
     scale: Callable[[S], Array]
+
+
+def label_watched(
+    arm: Manipulator, of_cables: Iterable[tuple[Kind, Indices]]
+) -> tuple[list[Kind], list[str], Indices]:
+    """Return kinds and places of what any arm is watched for, and which of its stops exist.
+
+    They are those ``of_cables``, the indices of which are given, of stops, and of contacts.
+    """
+    pairs = [(kind, arm.cables.names[c]) for kind, indices in of_cables for c in indices]
+    stops = np.flatnonzero(np.isfinite([arm.lower, arm.upper]))  # of joints with limits
+    pairs += [("stop", arm.joint_names[i % arm.nv]) for i in stops]
+    kinds = [kind for kind, _ in pairs]
+    places = [place for _, place in pairs]
+    of_contacts, contacts = contact_kinds(arm)
+    return kinds + of_contacts, places + contacts, stops
 
 
 class Between(Generic[S]):

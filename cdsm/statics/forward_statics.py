@@ -73,7 +73,7 @@ def forward_statics(
     ``events`` says what happens on the pull, and under the load: cables that go slack or pass their
     maximum, stops, a loss of stability. While motors pull, cables slide in most holes, which is no
     event; under the load, the first slip of each hole in which the cable did not slide already is
-    one. On the pull they are roots within its eight steps; what begins and ends in one is not seen.
+    one. On the pull they are roots within its eight steps, as in a load cycle.
 
     Args:
         arm: The arm.

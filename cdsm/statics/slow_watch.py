@@ -14,11 +14,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cdsm.friction.capstan import can_stick
-from cdsm.statics.contact_events import contact_kinds, contact_values
-from cdsm.statics.crossings import Watched
+from cdsm.routing import Indices
+from cdsm.statics.contact_events import contact_values
+from cdsm.statics.crossings import Watched, label_watched
 from cdsm.statics.events import Kind
 from cdsm.statics.quasi_static import ChainArmState, QuasiStaticArm
 from cdsm.statics.solve import ArmState, Balance, Point
@@ -43,7 +43,6 @@ def watched_slowly(arm: QuasiStaticArm, holes: Sequence[str]) -> Watched[SlowSta
     """Return what an arm with friction is watched for."""
     robot = arm.reference.arm
     cables = robot.cables
-    names = cables.names
     first = arm.start[:-1]
     rough = np.array([any(cable.friction) for cable in cables])
     held = ~arm.forced
@@ -55,22 +54,16 @@ def watched_slowly(arm: QuasiStaticArm, holes: Sequence[str]) -> Watched[SlowSta
     limited = np.flatnonzero(np.isfinite(most))
     begun = np.flatnonzero(known & (low > 0.0))
     ended = np.flatnonzero(known & np.isfinite(high))
-    stops = np.flatnonzero(np.isfinite([robot.lower, robot.upper]))
-    of_cables: tuple[tuple[Kind, NDArray[np.intp]], ...] = (
+    of_cables: tuple[tuple[Kind, Indices], ...] = (
         ("slack", stretched),
         ("maximum", limited),
         ("law", begun),
         ("law", ended),
     )
-    kinds: list[Kind] = ["slip"] * (2 * len(holes))
-    kinds += [kind for kind, indices in of_cables for _ in indices]
-    kinds += ["stop"] * stops.size
-    places = [*holes, *holes]
-    places += [names[c] for _, indices in of_cables for c in indices]
-    places += [robot.joint_names[i % robot.nv] for i in stops]
-    of_contacts, contacts = contact_kinds(robot)
-    kinds += of_contacts
-    places += contacts
+    kinds, places, stops = label_watched(robot, of_cables)
+    tensions = sum(indices.size for _, indices in of_cables)
+    angles = len(kinds) - tensions
+    slips: list[Kind] = ["slip"] * (2 * len(holes))
 
     def value(stage: SlowStage) -> Array:
         state = stage.point.state
@@ -92,11 +85,10 @@ def watched_slowly(arm: QuasiStaticArm, holes: Sequence[str]) -> Watched[SlowSta
 
     def scale(stage: SlowStage) -> Array:
         size = max(float(stage.point.state.tension.max(initial=0.0)), SMALLEST)
-        tensions = sum(indices.size for _, indices in of_cables)
-        parts = (1.0, 2 * len(holes)), (size, tensions), (1.0, stops.size + len(contacts))
+        parts = (1.0, len(slips)), (size, tensions), (1.0, angles)
         return np.concatenate([np.full(count, unit) for unit, count in parts])
 
-    return Watched(tuple(kinds), tuple(places), value, scale)
+    return Watched((*slips, *kinds), (*holes, *holes, *places), value, scale)
 
 
 def _slips(state: ChainArmState) -> tuple[Array, Array]:

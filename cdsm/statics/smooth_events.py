@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from cdsm.applied import Applied, combined, scaled
 from cdsm.manipulator import Manipulator
-from cdsm.statics.contact_events import contact_kind, contact_kinds, contact_values
+from cdsm.routing import Indices
+from cdsm.statics.contact_events import contact_kind, contact_values
 from cdsm.statics.continuation import follow
-from cdsm.statics.crossings import Between, Watched, crossings
+from cdsm.statics.crossings import Between, Watched, crossings, label_watched
 from cdsm.statics.events import Event, Kind, buckling_joint
 from cdsm.statics.hung_loads import total_force
 from cdsm.statics.locked_arm import LockedArm
@@ -35,8 +36,6 @@ def watched(arm: LockedArm, maximum: Array | None = None) -> Watched[Stage]:
     ``maximum`` (C,) [N] are the largest tensions; None: the cables' own.
     """
     cables = arm.reference.arm.cables
-    names = cables.names
-    joints = arm.reference.arm.joint_names
     most = np.array([cable.maximum for cable in cables]) if maximum is None else maximum
     laws = [cable.elasticity for cable in cables]
     held = cables.position_controlled & (not arm.tension_held)
@@ -45,32 +44,25 @@ def watched(arm: LockedArm, maximum: Array | None = None) -> Watched[Stage]:
     high = np.array([law.high for law in laws])
     begun = np.flatnonzero(held & (low > 0.0))
     ended = np.flatnonzero(held & np.isfinite(high))
-    cables_of: tuple[tuple[Kind, NDArray[np.intp]], ...] = (
+    of_cables: tuple[tuple[Kind, Indices], ...] = (
         ("maximum", limited),
         ("law", begun),
         ("law", ended),
     )
-    kinds: list[Kind] = [kind for kind, indices in cables_of for _ in indices]
-    places = [names[c] for _, indices in cables_of for c in indices]
-    # joints without limits have no stops
-    stops = np.flatnonzero(np.isfinite([arm.reference.arm.lower, arm.reference.arm.upper]))
-    kinds += ["stop"] * stops.size
-    places += [joints[i % len(joints)] for i in stops]
-    of_contacts, contacts = contact_kinds(arm.reference.arm)
-    kinds += of_contacts
-    places += contacts
+    kinds, places, stops = label_watched(arm.reference.arm, of_cables)
+    tensions = sum(indices.size for _, indices in of_cables)
+    angles = len(kinds) - tensions
 
     def value(stage: Stage) -> Array:
         locked = stage.arm
         F = locked.continued_tensions(stage.pose)
         gaps = stage.balance.gaps(stage.point.x).ravel()[stops]
-        tensions = (most - F)[limited], (F - low)[begun], (high - F)[ended]
-        return np.concatenate([*tensions, gaps, contact_values(stage.pose)])
+        within = (most - F)[limited], (F - low)[begun], (high - F)[ended]
+        return np.concatenate([*within, gaps, contact_values(stage.pose)])
 
     def scale(stage: Stage) -> Array:
         size = max(float(abs(stage.point.state.tension).max(initial=0.0)), 1e-300)
-        angles = stops.size + len(contacts)
-        return np.append(np.full(len(kinds) - angles, size), np.ones(angles))
+        return np.append(np.full(tensions, size), np.ones(angles))
 
     return Watched(tuple(kinds), tuple(places), value, scale)
 
@@ -156,9 +148,9 @@ def _within(
     def solve(share: float, below: Stage, above: Stage) -> Stage | None:
         return equilibrium_near(model, share, below) or equilibrium_near(model, share, above)
 
-    dip = _dip(model, here, there, watch) if depth else None
-    if dip is not None:
-        middle = equilibrium_near(model, dip, here)
+    share = _dip(model, here, there, watch) if depth else None
+    if share is not None:
+        middle = equilibrium_near(model, share, here)
         if middle is not None:
             return [
                 *_within(model, here, middle, watch, force, depth - 1),

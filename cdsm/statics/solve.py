@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from cdsm.errors import CdsmError, EquilibriumError
 from cdsm.posture import Posture
+from cdsm.readings import margin
 from cdsm.support.values import Array, frozen
 
 BALANCED = 1e-9  # largest |r| of an equilibrium, over the sum of the magnitudes of its terms
@@ -166,16 +167,11 @@ def continued(
     return None
 
 
-def least_of_symmetric(K: Array) -> float:
-    """Return the smallest eigenvalue of the symmetric part of K."""
-    return float(np.linalg.eigvalsh(K + K.T)[0]) / 2.0
-
-
 def stable_between(
     at: Callable[[Array], ArmState],
     before: Array,
     after: Array,
-    least: Callable[[Array], float] = least_of_symmetric,
+    least: Callable[[Array], Array | float] = margin,
 ) -> bool:
     """Return whether the ``least`` eigenvalue of K is positive on the way between two equilibria.
 
